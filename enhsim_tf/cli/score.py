@@ -54,7 +54,7 @@ def run_score(options: argparse.Namespace) -> int:
         frame = score(simulator, telemetry, run, chosen)
         write_scores(paths[model], frame)
         if options.figure:
-            from enhsim_tf.simulator.score_figure import score_figure
+            from enhsim_tf.simulator.figures import score_figure
 
             score_figure(frame, simulator, spoken(simulator.channels)).savefig(paths[model].with_suffix(".png"), dpi=200, format="png")
         found[source_names[model]] = {

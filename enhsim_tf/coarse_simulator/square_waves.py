@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, degrade
+from enhsim_tf.coarse_simulator.degraded import Degraded, degrade
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry
 
@@ -193,27 +193,6 @@ def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
     """Returns `(offset, scale)`, so that `(values - offset) / scale` maps the lowest level of a simulator to -1 and the highest to 1."""
     low, high = coarse.levels
     return (low + high) / 2, (high - low) / 2 or 1.0
-
-
-def simulate_schedule(
-    coarse: SquareWaveSimulator, time_s: np.ndarray, schedule: Sequence[ScheduledMode], rng: np.random.Generator
-) -> np.ndarray:
-    """Simulates a series that equals the nominal run outside of events, which do not overlap.
-
-    Args:
-        coarse: The coarse simulator.
-        time_s: Times in seconds, shape `(samples,)`.
-        schedule: The events, in the order of time.
-        rng: Random number generator for the lags of `friction` and the gaps of `dropout`.
-
-    Returns:
-        float32 array of shape `(samples,)`.
-    """
-    values = coarse.simulate(time_s[None])[0]
-    for event in schedule:
-        inside = slice(event.begin, event.end)
-        values[inside] = coarse.simulate(time_s[None, inside], Degraded(event.mode, event.severity, 0.0), rng)[0]
-    return values
 
 
 class Box(NamedTuple):

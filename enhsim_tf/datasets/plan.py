@@ -16,8 +16,7 @@ from typing import Any
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.mix import MOST_WINDOWS, Mix
-from enhsim_tf.simulator.model_folder import channels_of
-from enhsim_tf.simulator.saving import MANIFEST, check_saved, settings_of
+from enhsim_tf.simulator.model_folder import MANIFEST, channels_of, check_saved, settings_of
 
 FORMAT = "enhsim_tf.datasets.generate/3"
 _SHARD = 8_192  # default windows per shard, for windows of up to 512 samples

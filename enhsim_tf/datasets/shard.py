@@ -17,7 +17,7 @@ from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import NOMINAL, parquet_options, window_schema, window_table
 from enhsim_tf.datasets.plan import FORMAT, Plan, plan_key
-from enhsim_tf.simulator.saving import MANIFEST
+from enhsim_tf.simulator.model_folder import MANIFEST
 
 if TYPE_CHECKING:
     import pyarrow as pa

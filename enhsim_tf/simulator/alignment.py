@@ -6,59 +6,45 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, held_samples
+from enhsim_tf.coarse_simulator.degraded import Degraded, held_samples
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import pair_with_recording
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, simulate_schedule, waves_or_level
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, waves_or_level
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.joint import cut, telemetry_of
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
+START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the waveform
 _SAME_PERIOD = 0.02  # largest relative difference of periods that are one clock
 
 
 class Aligned(NamedTuple):
-    """Coarse windows of the same times as telemetry windows.
-
-    Args:
-        coarse: float32 of shape `(windows, samples, columns)`.
-        shift: Offset of each window and channel, shape `(windows, channels)`; None if the level is that of the enhancer.
-        gain: Factor of each window and channel, same shape; None likewise.
-    """
+    """Coarse windows of the same times as telemetry windows, float32, and offset and gain of each window and channel, in float64."""
 
     coarse: np.ndarray
-    shift: np.ndarray | None = None
-    gain: np.ndarray | None = None
+    shift: np.ndarray
+    gain: np.ndarray
 
 
 class Drawn(NamedTuple):
-    """Coarse windows for generated telemetry.
+    """Coarse windows for generated telemetry, float32 of shape `(windows, samples, columns)`, and the same without a degraded mode.
 
-    Args:
-        coarse: float32 of shape `(windows, samples, columns)`.
-        nominal: The same windows without a degraded mode.
-        held: Window, channel, first sample and end of each range of samples at which a mechanism is stuck.
+    `held` is for each sample the one whose value it has: where a mechanism is stuck, the first of these samples, otherwise itself; None if nothing
+    is stuck.
     """
 
     coarse: np.ndarray
     nominal: np.ndarray
-    held: list[tuple[int, int, int, int]]
+    held: np.ndarray | None = None
 
 
 class Waves:
     """One square wave or constant level for each channel, aligned with each window in phase, offset and gain.
 
-    Coarse windows are in units of the wave: -1 is its lowest level, 1 its highest.
-
-    Args:
-        simulators: The coarse simulator of each channel.
-        channels: Names of the channels.
-        interval_s: Sampling interval in seconds.
-        window: Length of a window in samples.
-        waveforms: For each channel its enhanced waveform in these units at `_NUM_PHASES` phases, shape `(phases, samples)`, or None for the
-            square wave itself. A square wave shows its phase only at its edges, the enhanced waveform at every sample.
+    Coarse windows are in units of the wave: -1 is its lowest level, 1 its highest. A square wave shows its phase only at its edges, the enhanced
+    waveform of a channel at every sample: `waveforms` has it at `_NUM_PHASES` phases, shape `(phases, samples)`, or None.
     """
 
     kind = "waves"
@@ -88,11 +74,7 @@ class Waves:
         return self._in_unit(channel, self.simulators[channel].simulate(starts[:, None] + self.interval_s * np.arange(self.window)))
 
     def align(self, targets: np.ndarray) -> Aligned:
-        """Finds phase, offset and gain of each window and channel.
-
-        Args:
-            targets: Telemetry windows, shape `(windows, samples, channels)`.
-        """
+        """Finds phase, offset and gain of each channel in telemetry windows of shape `(windows, samples, channels)`."""
         coarse = np.zeros(targets.shape, np.float32)
         shift, gain = np.zeros((2, len(targets), targets.shape[2]))
         for channel, simulator in enumerate(self.simulators):
@@ -120,9 +102,6 @@ class Waves:
         """Returns the waves with one period where periods are nearly equal, at the distance in phase that telemetry windows show.
 
         Periods that are fitted to each channel alone differ a little, and over a long time every relation of their phases would occur.
-
-        Args:
-            targets: Telemetry windows, shape `(windows, samples, channels)`.
         """
         simulators = list(self.simulators)
         moving = [number for number, each in enumerate(simulators) if not each.is_constant]
@@ -144,26 +123,35 @@ class Waves:
         return gain < MIN_GAIN * waves
 
     def draw(self, starts: np.ndarray, scenarios: Sequence[Degraded | None], rng: np.random.Generator) -> Drawn:
-        """Simulates coarse windows.
-
-        Args:
-            starts: First sample of each window on the clock of the waves, shape `(windows,)`.
-            scenarios: Degraded mode of each window, or None.
-            rng: Draws what is random in a degraded mode.
-        """
-        starts = np.asarray(starts)
+        """Simulates coarse windows that begin at these samples of the clock of the waves, each with its scenario or None."""
+        starts, rows_of = np.asarray(starts), {}
+        for row, scenario in enumerate(scenarios):
+            if scenario is not None:
+                rows_of.setdefault(scenario, []).append(row)
         nominal = np.concatenate([self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2)
-        if not any(scenarios):
-            return Drawn(nominal, nominal, [])
-        coarse, held = nominal.copy(), []
-        for scenario in dict.fromkeys(each for each in scenarios if each is not None):
-            rows = np.array([number for number, each in enumerate(scenarios) if each == scenario])
-            stuck = held_samples(scenario, self.window)
-            for channel in self._concerned(scenario):
-                times = self._times(starts[rows])
-                coarse[rows, :, channel] = self._in_unit(channel, self.simulators[channel].simulate(times, scenario, rng))
-                held += [(int(row), channel, *stuck) for row in rows] if stuck else []
-        return Drawn(coarse, nominal, held)
+        changes = [(channel, rows, scenario, 0, self.window) for scenario, rows in rows_of.items() for channel in self._concerned(scenario)]
+        return self._degraded(nominal, self._times(starts), changes, rng) if changes else Drawn(nominal, nominal)
+
+    def draw_series(self, num_samples: int, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
+        """Simulates one coarse series, as a single window of `num_samples`; each event is a mode, its first sample and its end."""
+        times, numbers = (self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
+        nominal = np.stack([self._in_unit(channel, self.simulators[channel].simulate(times)) for channel in numbers], axis=2)
+        changes = [(channel, [0], *event) for channel in numbers for event in events if channel in self._concerned(event[0])]
+        return self._degraded(nominal, times, changes, rng)
+
+    def _degraded(
+        self, nominal: np.ndarray, times: np.ndarray, changes: Sequence[tuple[int, list[int], Degraded, int, int]], rng: np.random.Generator
+    ) -> Drawn:
+        """Puts degraded modes into coarse windows; each change is a channel, its windows, the mode, its first sample and its end."""
+        coarse, is_stuck = nominal.copy(), False
+        held = np.broadcast_to(np.arange(nominal.shape[1])[:, None], nominal.shape).copy()
+        for channel, rows, scenario, begin, end in changes:
+            values = self.simulators[channel].simulate(times[rows, begin:end], scenario, rng)
+            coarse[rows, begin:end, channel] = self._in_unit(channel, values)
+            stuck = held_samples(scenario, end - begin)
+            if stuck is not None:
+                held[rows, begin + stuck[0] : begin + stuck[1], channel], is_stuck = begin + stuck[0], True
+        return Drawn(coarse, nominal, held if is_stuck else None)
 
     def _nominal(self, channel: int, starts: np.ndarray) -> np.ndarray:
         """Simulates nominal windows of a channel, shape `(windows, samples, 1)`; many are cut out of one series that is kept."""
@@ -178,39 +166,14 @@ class Waves:
     def _times(self, starts: np.ndarray) -> np.ndarray:
         return self.interval_s * (starts[:, None] + np.arange(self.window))
 
-    def draw_series(
-        self,
-        num_samples: int,
-        start_s: float,
-        scenario: Degraded | None,
-        schedule: Sequence[ScheduledMode],
-        length: int,
-        rng: np.random.Generator,
-    ) -> Drawn:
-        """Simulates one coarse series, as a single window of `num_samples` of which a scenario covers the first `length`."""
-        times = start_s + self.interval_s * np.arange(num_samples)
-        nominal = np.stack([self._in_unit(channel, each.simulate(times[None])[0]) for channel, each in enumerate(self.simulators)], axis=1)
-        coarse, held = nominal.copy(), []
-        for channel in self._concerned(scenario):
-            simulator = self.simulators[channel]
-            if scenario is not None:
-                changed = simulator.simulate(times[None, :length], scenario, rng)[0]
-                coarse[:length, channel] = self._in_unit(channel, changed)
-            elif schedule:
-                coarse[:, channel] = self._in_unit(channel, simulate_schedule(simulator, times, schedule, rng))
-            whole = [(scenario.mode, scenario.severity, 0, length, scenario.onset)] if scenario else []
-            for mode, severity, begin, end, onset in whole or [(e.mode, e.severity, e.begin, e.end, 0.0) for e in schedule]:
-                stuck = held_samples(Degraded(mode, severity, onset), end - begin)
-                held += [(0, channel, begin + stuck[0], begin + stuck[1])] if stuck else []
-        return Drawn(coarse[None], nominal[None], held)
-
-    def _concerned(self, scenario: Degraded | None) -> range | list[int]:
-        name = getattr(scenario, "channel", None)
-        if name is None:
+    def _concerned(self, scenario: Degraded) -> Sequence[int]:
+        if scenario.channel is None:
             return range(len(self.channels))
-        if name not in self.channels:
-            raise InputError(f"Expected a channel, one of: {', '.join(self.channels)[:200]}. Received: {name!r} in the scenario.")
-        return [self.channels.index(name)]
+        if scenario.channel not in self.channels:
+            raise InputError(
+                f"Expected a channel, one of: {', '.join(self.channels)[:200]}. Received: {scenario.channel!r} in the scenario."
+            )
+        return [self.channels.index(scenario.channel)]
 
     def _in_unit(self, channel: int, values: np.ndarray) -> np.ndarray:
         offset, scale = level_offset_and_scale(self.simulators[channel])
@@ -218,7 +181,7 @@ class Waves:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """The enhanced waveforms by name."""
+        """What is saved as arrays: the enhanced waveforms by name."""
         return {f"waveform_{number}": each for number, each in enumerate(self.waveforms) if each is not None}
 
     @property
@@ -271,10 +234,7 @@ class Runs:
         return self.nominal.columns
 
     def usable(self, run: Recording) -> Recording:
-        """Returns the parts and columns of a recording that can be enhanced.
-
-        Args:
-            run: A recording. Its columns may be in any order, and further columns are ignored.
+        """Returns the parts of a recording that can be enhanced, with the columns of the fit; further columns are ignored.
 
         Raises:
             InputError: If a column is missing, the interval differs, or every part is shorter than a window.
@@ -294,81 +254,70 @@ class Runs:
         return dataclasses.replace(run, parts=parts)
 
     def pair(self, telemetry: Recording, run: Recording) -> tuple[Recording, Recording]:
-        """Cuts telemetry and a run to the stretches of at least a window that both cover.
-
-        Args:
-            telemetry: Telemetry.
-            run: A run of the same time.
-
-        Returns:
-            Both, with the same parts.
-
-        Raises:
-            InputError: If they share no window.
-        """
+        """Cuts telemetry and a run to the stretches of at least a window that both cover; raises InputError if there are none."""
         return pair_recordings(telemetry, self.usable(run), self.delay_s, self.window)
 
     def draw(self, starts: np.ndarray, scenarios: Sequence[Any], rng: np.random.Generator) -> Drawn:
         """Cuts coarse windows out of the nominal run; `starts` count its possible windows and begin again after the last.
 
-        Raises:
-            InputError: If a scenario is given, because a recorded run is nominal.
+        Raises InputError for a scenario, because a recorded run is nominal.
         """
         for scenario in scenarios:
-            self._refuse(scenario)
+            if scenario is not None:
+                raise InputError(
+                    f"Expected a recorded run of the scenario for a model of recorded runs. Received: {str(scenario)[:80]}. "
+                    "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
+                )
         parts = [part.values for part in self.usable(self.nominal).parts]
         number = sum(len(each) - self.window + 1 for each in parts)
         windows = cut(parts, np.asarray(starts) % number, self.window)
-        return Drawn(windows, windows, [])
-
-    def _refuse(self, scenario: Any) -> None:
-        if scenario is not None:
-            raise InputError(
-                f"Expected a recorded run of the scenario for a model of recorded runs. Received: {str(scenario)[:80]}. "
-                "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
-            )
+        return Drawn(windows, windows)
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """The parts of the nominal run by name."""
-        return {f"part_{number}": part.values for number, part in enumerate(self.nominal.parts)}
+        return arrays_of_recording(self.nominal)[0]
 
     @property
     def settings(self) -> dict[str, Any]:
         """All else, in plain JSON types."""
-        kept = {"columns": list(self.columns), "start": self.nominal.start, "offsets_s": [part.offset_s for part in self.nominal.parts]}
-        return {"kind": self.kind, "delay_s": self.delay_s, "name": self.name, "commands": self.commands} | kept
+        own = {"kind": self.kind, "delay_s": self.delay_s, "name": self.name, "commands": self.commands, "columns": list(self.columns)}
+        return own | arrays_of_recording(self.nominal)[1]
 
     @classmethod
     def from_arrays(
         cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray], channels: Sequence[str], interval_s: float, window: int
     ) -> "Runs":
         """Builds the alignment again; raises ValueError if it is none."""
-        runs = tuple(Run(arrays[f"part_{number}"], float(offset)) for number, offset in enumerate(settings["offsets_s"]))
-        nominal = Recording(runs, tuple(settings["columns"]), interval_s, settings["start"], str(settings["name"]))
-        if not np.isfinite([settings["delay_s"], *settings["offsets_s"]]).all() or any(run.values.dtype != np.float32 for run in runs):
+        nominal = recording_of(arrays, settings, tuple(settings["columns"]), interval_s, str(settings["name"]))
+        if not np.isfinite([settings["delay_s"], *settings["offsets_s"]]).all() or any(
+            run.values.dtype != np.float32 for run in nominal.parts
+        ):
             raise ValueError("a nominal run that is not finite, or of another type")
-        return cls(nominal, window, settings["delay_s"], None, str(settings["name"]), settings["commands"])
+        return cls(nominal, window, settings["delay_s"], None, nominal.name, settings["commands"])
+
+
+def arrays_of_recording(recording: Recording) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """What is saved of a recording: its parts as arrays by name, and its times in plain JSON types."""
+    arrays = {f"part_{number}": part.values for number, part in enumerate(recording.parts)}
+    return arrays, {"start": recording.start, "offsets_s": [part.offset_s for part in recording.parts]}
+
+
+def recording_of(
+    arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any], columns: tuple[str, ...], interval_s: float, name: str
+) -> Recording:
+    """Builds a recording again from what `arrays_of_recording` returns; raises ValueError if a value is not finite."""
+    parts = tuple(Run(arrays[f"part_{number}"], float(offset)) for number, offset in enumerate(settings["offsets_s"]))
+    if not all(np.isfinite(part.values).all() for part in parts):
+        raise ValueError("a recording that is not finite")
+    return Recording(parts, columns, interval_s, settings["start"], name)
 
 
 Alignment = Waves | Runs
 
 
 def pair_recordings(telemetry: Recording, run: Recording, delay_s: float, least_samples: int) -> tuple[Recording, Recording]:
-    """Cuts telemetry and a coarse run to the stretches that both cover; see `pairing.pair_with_recording`.
-
-    Args:
-        telemetry: Telemetry.
-        run: The coarse run.
-        delay_s: How much later the telemetry is than the run, in seconds.
-        least_samples: Shortest stretch that is kept.
-
-    Returns:
-        The telemetry and the run, with the same parts on the clock of the telemetry.
-
-    Raises:
-        InputError: If the two share no time, or no stretch is long enough.
-    """
+    """Cuts telemetry and a coarse run to the same parts, which both cover, on the clock of the telemetry; see `pair_with_recording`."""
     values, coarse, interval_s = [], [], telemetry.interval_s
     for pair in pair_with_recording(telemetry_of(telemetry), run, delay_s, least_samples):
         low = pair.telemetry.offset_s
@@ -381,12 +330,7 @@ def pair_recordings(telemetry: Recording, run: Recording, delay_s: float, least_
 
 
 def least_squares(waveform: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the shift and the gain by which each waveform fits its target best. A constant waveform gets a gain of 0.
-
-    Args:
-        waveform: Shape `(windows, samples)`.
-        target: Same shape.
-    """
+    """Returns the shift and the gain by which each waveform of shape `(windows, samples)` fits its target; a gain of 0 if it is constant."""
     wave_mean, target_mean = (each.mean(axis=1, dtype=np.float64) for each in (waveform, target))
     centred = waveform - wave_mean[:, None]
     power = np.sum(centred**2, axis=1)

@@ -4,8 +4,8 @@ Square waves need a period that occurs at least twice. Commands need no period. 
 what comes when, and says so. Only telemetry that is constant or very short is refused.
 """
 
-import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from enhsim_tf.simulator.options import FEWEST_SAMPLES, LEAST_LEARNT, LEAST_WIND
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import time_blocks
 
-SQUARE_WAVES, COMMANDS, LEVEL = "square waves", "commands", "constant level"
 LEAST_SAMPLES = LEAST_LEARNT * FEWEST_SAMPLES  # a shorter record is refused
 _LEAST_EXPLAINED = 0.05  # minimum share of the variance that the coarse simulator explains
 _CHANCE = 30.0  # divided by the number of samples: the share of the variance of white noise that the best of all square waves may explain
@@ -25,22 +24,11 @@ _NUM_BLOCKS = 5  # of time, on which it is measured what commands explain
 _NUM_SHIFTS = 19  # of the commands in time, which show what they explain by chance
 _PENALTIES = (0.01, 0.1, 1.0, 10.0)  # of the ridge regression on traces, relative to the number of samples
 _NEGLIGIBLE = 1e-6  # standard deviation of a trace
-_LEAST_STEPS = 3  # with fewer changes of the value, the record shows only that the channel can change
 
 
-@dataclasses.dataclass(frozen=True)
-class CoarseChoice:
-    """The coarse simulator of a channel.
+class CoarseChoice(NamedTuple):
+    """The coarse simulator of a channel, or the traces of its commands, and in a sentence or two why, and how little it knows."""
 
-    Args:
-        kind: `SQUARE_WAVES`, `COMMANDS` or `LEVEL`.
-        window: Length of a window in samples.
-        said: What was chosen and why, and how little it knows: one or two sentences.
-        coarse: The coarse simulator; None for commands.
-        traces: The traces of the commands; None for the other kinds.
-    """
-
-    kind: str
     window: int
     said: str
     coarse: SquareWaveSimulator | None = None
@@ -58,9 +46,6 @@ def choose_coarse(
         commands: Commands of the samples from sample 0 on, shape `(samples, commands)`; None if there are none.
         refused: Why square waves are not to be used; None if they may be.
 
-    Returns:
-        The choice.
-
     Raises:
         InputError: If the telemetry is constant, or shorter than eight windows.
     """
@@ -77,11 +62,11 @@ def choose_coarse(
     traces, by_commands = (None, 0.0) if commands is None else _explained_by_commands(parts, commands)
     is_wave_sure = by_commands <= by_wave and len(longest) >= _FEW_PERIODS * period  # few periods may be found in any slow telemetry
     if coarse is not None and (is_wave_sure or not by_commands):
-        wanted = window or window_of(coarse, longest.interval_s)
+        wanted = window or int(np.clip(round(2 * period), LEAST_WINDOW, MOST_WINDOW))  # two periods
         # a window shorter than half a period shows no edge of the wave most of the time
         fitting = _fitting_window(parts, wanted, wanted if window else max(FEWEST_SAMPLES, min(wanted, int(np.ceil(period / 2)))))
         if fitting:
-            return CoarseChoice(SQUARE_WAVES, fitting, f"coarse simulator: {about_wave}.", coarse)
+            return CoarseChoice(fitting, f"coarse simulator: {about_wave}.", coarse)
         about_wave = f"{LEAST_LEARNT} windows of half the period of its best square wave, {period:.0f} samples, do not fit into {len(values):,} samples"
     wanted = window or default_window(len(values))
     fitting = _fitting_window(parts, wanted, wanted if window else FEWEST_SAMPLES)
@@ -97,36 +82,19 @@ def choose_coarse(
             f"coarse simulator: traces of {len(traces.chosen)} of the commands, which explain {by_commands:.0%} of the variance on held-out time; "
             f"{about_wave}. It knows only what the commands tell."
         )
-        return CoarseChoice(COMMANDS, fitting, said, traces=traces)
+        return CoarseChoice(fitting, said, traces=traces)
     if commands is not None:
         about_commands = "no command was sent" if traces is None else "its commands explain no more of it than commands at other times"
-    steps = int(np.count_nonzero(np.diff(longest.values)))
-    rare = f" The value changes only {steps} times in the record." if steps < max(_LEAST_STEPS, len(longest) // 200) else ""
     said = (
         f"coarse simulator: none, only a constant level, because {about_wave}, and {about_commands}. The simulator knows no shape and no times: "
-        f"it generates noise around levels of the record. Of the degraded modes, only drift and dropout change it, and in a series stuck.{rare}"
+        f"it generates noise around levels of the record. Of the degraded modes, only drift and dropout change it, and in a series stuck."
     )
     level = ConstantLevel(values.mean(), values.std(), 2 * fitting * longest.interval_s)
-    return CoarseChoice(LEVEL, fitting, said, level)
-
-
-def window_of(coarse: SquareWaveSimulator, interval_s: float) -> int:
-    """Returns the default window length: two periods of the coarse simulator in samples, limited to the networks' range.
-
-    Args:
-        coarse: The coarse simulator.
-        interval_s: Sampling interval in seconds.
-    """
-    longest_s = max(wave.period_s for wave in coarse.waves)
-    return int(np.clip(round(2 * longest_s / interval_s), LEAST_WINDOW, MOST_WINDOW))
+    return CoarseChoice(fitting, said, level)
 
 
 def _square_wave(telemetry: Telemetry) -> tuple[SquareWaveSimulator | None, str, float, float]:
-    """Fits a square wave.
-
-    Returns the wave, or None if it cannot be used, what is to be said of it, its period in samples, and the share of the variance that
-    it explains.
-    """
+    """Fits a square wave: the wave or None, what is to be said of it, its period in samples, and the share of the variance it explains."""
     try:
         coarse = SquareWaveSimulator.fit(telemetry)
     except InputError:  # there is no peak in the periodogram
@@ -154,8 +122,7 @@ def _fitting_window(parts: Sequence[Telemetry], most: int, least: int) -> int | 
 def _explained_by_commands(parts: Sequence[Telemetry], commands: np.ndarray) -> tuple[CommandTraces | None, float]:
     """Returns the traces of the commands, and the share of the variance that they explain on held-out blocks of time.
 
-    The share counts only if it is larger than with the same commands at other times. Otherwise it is 0: slow traces of unrelated
-    commands are smooth in time and may follow slow telemetry by chance.
+    The share is 0 unless it is larger than with the same commands at other times: slow traces of unrelated commands may follow slow telemetry.
     """
     rows = np.concatenate([round(part.offset_s) + np.arange(len(part)) for part in parts])
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
@@ -173,10 +140,7 @@ def _explained_by_commands(parts: Sequence[Telemetry], commands: np.ndarray) -> 
 
 
 def _held_out_share(values: np.ndarray, commands: np.ndarray) -> float:
-    """Returns the share of the variance that the traces explain on blocks of time for which they were neither chosen nor fitted.
-
-    It is the share of the best of several penalties of ridge regression.
-    """
+    """Returns the share of the variance that the traces explain on held-out blocks of time, with the best of several penalties of ridge."""
     left = np.zeros(len(_PENALTIES))
     for training, held_out in time_blocks(np.arange(len(values)), _NUM_BLOCKS, 1):
         chosen = CommandTraces.fit(values, commands, training)

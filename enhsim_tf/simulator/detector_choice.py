@@ -6,24 +6,21 @@ because injected anomalies only stand in for real ones, and the first of them in
 holds for the anomalies of their relation; where no detector is near the best in both, the sum decides. If none keeps its promise, the one with the
 fewest false alarms is taken, and the report says so in its first line.
 
-The tenth and the twenty points were set on 2026-11-26, after six SMAP channels had been seen: with two points and no tenth, the mean area under the
-precision-recall curve of the chosen detectors was .74 there; that of the residual alone was .81.
+The tenth and the twenty points were set on 2026-11-26, after six SMAP channels had been seen (mean area under the precision-recall curve .74 with
+two points and no tenth; .81 of the residual alone).
 """
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.detection import metrics
-from enhsim_tf.simulator.joint import cut
 from enhsim_tf.simulator.noise_choice import anomalous_windows
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.scoring import Scorer
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 CANDIDATES = ("residual", "PCA residual", "innovation", "largest step", "moving deviation")
 RATE = 0.01  # false-alarm rate for which thresholds are set
@@ -66,10 +63,6 @@ class JudgedDetector:
         found = [self.by_kind[kind] for kind in RELATIONS if kind in self.by_kind]
         return min(found, default=0.0)
 
-    def to_dict(self) -> dict[str, Any]:
-        """All fields in plain JSON types."""
-        return dataclasses.asdict(self) | {"keeps": bool(self.keeps)}
-
 
 def choose_detector(judged: Sequence[JudgedDetector]) -> JudgedDetector:
     """Returns the detector that the rule chooses; see the module."""
@@ -81,45 +74,28 @@ def choose_detector(judged: Sequence[JudgedDetector]) -> JudgedDetector:
     return near[0] if near else max(keeping, key=lambda each: each.recall + each.of_relations())
 
 
-def judge_detectors(
-    simulator: EnhancedSimulator,
-    learnt: Recording,
-    held_out: Recording,
-    runs: tuple[Recording | None, Recording | None] = (None, None),
-    seed: int = 0,
-    names: Sequence[str] = CANDIDATES,
-) -> list[JudgedDetector]:
-    """Judges detectors on held-out nominal time.
-
-    Args:
-        simulator: The simulator.
-        learnt: Nominal telemetry of the fit, which bounds the thresholds.
-        held_out: Nominal telemetry after it, in parts of at least a window.
-        runs: The coarse runs of both, for recorded runs.
-        seed: Random seed of the detectors and the anomalies.
-        names: Names of the detectors.
-    """
-    clean = None if runs[1] is None else [simulator.enhance_run(part.values) for part in runs[1].parts]
-    series = [part.values for part in held_out.parts]
-    seen = series if clean is None else [own - under for own, under in zip(series, clean, strict=True)]
-    starts = evenly_spaced_starts(series, simulator.window, 3 * _NUM_ANOMALOUS)
-    windows = cut(series, starts, simulator.window)
-    below = 0.0 if clean is None else cut(clean, starts, simulator.window)
+def judge_detectors(simulator: EnhancedSimulator, held_out: Recording, run: Recording | None, seed: int = 0) -> list[JudgedDetector]:
+    """Judges all candidates on nominal telemetry after the fit, in parts of at least a window, and its coarse run, for recorded runs."""
+    series = simulator.judged_series(held_out, run)
+    windows, clean = simulator.windows_and_signal(held_out, run, 3 * _NUM_ANOMALOUS)
+    below = 0.0 if run is None else clean
     anomalous = anomalous_windows(
         windows, np.where(simulator.noise_sd > 0, simulator.noise_sd, simulator.scale), seed, _NUM_ANOMALOUS, SEVERITIES
     )
+    if run is not None:
+        at = np.linspace(0, len(windows) - 1, min(_NUM_ANOMALOUS, len(windows))).astype(int)
+        order = np.concatenate([np.arange(place, len(at), 3) for place in range(3)])  # in which `anomalous_windows` returns them
+        anomalous = {key: each - clean[at][order] for key, each in anomalous.items()}
     if len(simulator.channels) > 1:
-        enhanced = simulator.enhance(*simulator.alignment.align(windows)) if clean is None else below
-        anomalous |= relation_anomalies(windows, enhanced, np.random.default_rng([seed, 17]))
-    at = np.linspace(0, len(windows) - 1, min(_NUM_ANOMALOUS, len(windows))).astype(int)
-    if clean is not None:
-        anomalous = {key: each - (below if key[0] in RELATIONS else below[at][_order(len(at))]) for key, each in anomalous.items()}
+        relations = relation_anomalies(windows, clean, np.random.default_rng([seed, 17]))
+        anomalous |= {key: each - below for key, each in relations.items()}
     anomalies = np.concatenate(list(anomalous.values()))
     num_disjoint = sum(len(each) // simulator.window for each in series)
+    allowed = min(max(_MOST_TIMES * RATE, _FEW / max(num_disjoint, 1)), _MOST)
     found = []
-    for name in names:
-        scorer = Scorer(simulator, ScoreOptions(name, _NUM_GENERATED, RATE, seed), learnt, runs[0])
-        flags = np.concatenate([scorer.score_series(each) > 1 for each in seen])
+    for name in CANDIDATES:
+        scorer = Scorer(simulator, ScoreOptions(name, _NUM_GENERATED, RATE, seed))
+        flags = np.concatenate([scorer.score_series(each) > 1 for each in series])
         # single windows are compared with single nominal windows, whose scores vary more than those of samples
         nominal = scorer.score_windows(windows - below)
         limit = max(float(np.quantile(nominal, 1 - RATE)), scorer.threshold)
@@ -128,28 +104,16 @@ def judge_detectors(
         for (kind, _), some in zip(anomalous, scores, strict=True):
             recalls.setdefault(kind, []).append(metrics.recall(some, limit))
         by_kind = {kind: float(np.mean(each)) for kind, each in recalls.items()}
-        allowed = min(max(_MOST_TIMES * RATE, _FEW / max(num_disjoint, 1)), _MOST)
         recall = float(np.mean([each for kind, each in by_kind.items() if kind not in RELATIONS]))
         found.append(JudgedDetector(name, float(flags.mean()), allowed, recall, by_kind))
     return found
 
 
-def _order(number: int) -> np.ndarray:
-    """The order in which `anomalous_windows` returns windows: every third one, from each of the first three."""
-    return np.concatenate([np.arange(place, number, 3) for place in range(3)])
-
-
 def relation_anomalies(windows: np.ndarray, clean: np.ndarray, rng: np.random.Generator) -> dict[tuple[str, float], np.ndarray]:
     """Makes anomalies that leave the values of every channel as they are, and change only how the channels move together.
 
-    Args:
-        windows: Nominal windows, shape `(windows, samples, channels)`.
-        clean: The enhanced signal below them, of the same shape.
-        rng: Draws the channel of each window.
-
-    Returns:
-        As `anomalous_windows`: windows in which one channel is that of another time, windows in which one channel is shifted by a quarter of
-        a window against the others, and windows in which the noise of one channel is that of another time.
+    In each window one channel is that of another time, is shifted by a quarter of a window against the others, or has the noise of another
+    time above its enhanced signal. Windows and result are as in `anomalous_windows`; `clean` is the enhanced signal below them.
     """
     number, samples, channels = windows.shape
     rows, channel = np.arange(number), rng.integers(0, channels, number)

@@ -32,11 +32,7 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
         self.window, self.detector, self.false_alarm_rate, self.seed = window, detector, false_alarm_rate, seed
 
     def fit(self, X: np.ndarray, y: Any = None) -> "TelemetryDetector":  # noqa: N803  as scikit-learn names it
-        """Fits simulator and detector to nominal telemetry.
-
-        Args:
-            X: Nominal telemetry, shape `(samples, channels)`.
-            y: Not used.
+        """Fits simulator and detector to nominal telemetry of shape `(samples, channels)`; `y` is not used.
 
         Raises:
             InputError: If the telemetry is constant or too short.
@@ -50,11 +46,7 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
         return self
 
     def score_samples(self, X: np.ndarray) -> np.ndarray:  # noqa: N803
-        """Returns the score of each sample; lower is more anomalous, and below -1 is flagged.
-
-        Args:
-            X: Telemetry, shape `(samples, channels)`, with at least a window of samples.
-        """
+        """Returns the score of each sample of telemetry with at least a window; lower is more anomalous, and below -1 is flagged."""
         check_is_fitted(self)
         return -self.scorer_.score_series(validate_data(self, X, dtype=np.float32, reset=False))
 

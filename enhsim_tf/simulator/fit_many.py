@@ -10,7 +10,7 @@ import multiprocessing
 import os
 import sys
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,9 +19,8 @@ from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from enhsim_tf.simulator.model_folder import folder_of, name_of_channels, refuse_foreign
+from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.options import FitOptions
-from enhsim_tf.simulator.saving import MANIFEST
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
 
@@ -37,14 +36,7 @@ THREADS = 1  # of a worker
 
 @dataclasses.dataclass(frozen=True)
 class CoarseRun:
-    """Where the recorded run of a coarse simulator is.
-
-    Args:
-        source: A source of telemetry, see `sources.read_source`.
-        columns: Names of the columns that are inputs; None: all numeric columns.
-        time: Name of the time column; None: it is detected.
-        start: Time of its zero in UTC, if its times count from zero; None: its times are those of the telemetry.
-    """
+    """Where the recorded run of a coarse simulator is; see `recording_files.read_recording` for its columns, time and start."""
 
     source: str
     columns: Sequence[str] | None = None
@@ -54,16 +46,9 @@ class CoarseRun:
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """Channels to fit: together, if there are several.
+    """Channels to fit: together, if there are several. The fields are arguments of `fit_channels`.
 
-    Args:
-        series: Raw values of each channel, as returned by `sources.read_source`.
-        out: Folder of all models; an absolute path, because a worker may have another working directory.
-        options: Options of the fit.
-        cleaning: Settings of the cleaning.
-        speaks: Whether to print lines of progress.
-        run: The recorded run of a coarse simulator, or None.
-        commands: Commands of the samples of a single channel, shape `(samples, commands)`, or None.
+    `out` is an absolute path, because a worker may have another working directory.
     """
 
     series: "Mapping[str, pd.Series]"
@@ -80,21 +65,14 @@ class Job:
         return name_of_channels(list(self.series))
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass
 class Outcome:
-    """What became of a job.
-
-    Args:
-        name: Name of the job.
-        lines: Lines of its reports.
-        reports: Report of each simulator, by the name of its channels.
-        failed: For each channel that could not be fitted, the reason.
-    """
+    """What became of a job: lines to print, the report of each simulator by the name of its channels, and why other channels failed."""
 
     name: str
-    lines: Sequence[str] = ()
-    reports: Mapping[str, dict] = dataclasses.field(default_factory=dict)
-    failed: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    lines: list[str] = dataclasses.field(default_factory=list)
+    reports: dict[str, dict] = dataclasses.field(default_factory=dict)
+    failed: dict[str, str] = dataclasses.field(default_factory=dict)
 
 
 def fit_channels(
@@ -119,12 +97,11 @@ def fit_channels(
         cleaning: Settings of the cleaning.
         tell: Function that is called with each line of output.
         separately: Whether each channel gets a simulator of its own.
-        workers: Number of channels that are fitted at the same time, each in its own process. None uses one worker per CPU. The
-            number of workers does not change the results. 0 fits all channels in this process.
-        engine: How worker processes are run: `local` or `ray`. The engine does not change the results.
+        workers: Number of channels that are fitted at the same time, each in its own process. None: one per CPU; 0: all in this process.
+        engine: How worker processes are run: `local` or `ray`. Neither it nor the number of workers changes the results.
         speaks: Whether to print lines of progress.
         run: The recorded run of a coarse simulator, or None.
-        commands: Commands of the samples of a single channel, shape `(samples, commands)`; None if there are none.
+        commands: Commands of the samples of a single channel, shape `(samples, commands)`, or None.
 
     Returns:
         The reports by the names of their channels, and for each channel that could not be fitted the reason.
@@ -147,73 +124,59 @@ def fit_channels(
     remove_leftovers(out)
     reports: dict[str, dict] = {}
     failed: dict[str, str] = {}
-
-    def note(outcome: Outcome) -> None:
-        reports.update(outcome.reports)
-        failed.update(outcome.failed)
-        for line in outcome.lines:
-            tell(line)
-
+    in_this_process = workers == 0 or (len(jobs) == 1 and engine == "local")
     try:
-        if workers == 0 or (len(jobs) == 1 and engine == "local"):
-            for job in jobs:
-                note(fit_or_say(job))
-        else:
-            _fit_in_processes(jobs, engine, workers, note)
+        for outcome in map(fit_or_say, jobs) if in_this_process else _fitted_by_processes(jobs, engine, workers):
+            reports |= outcome.reports
+            failed |= outcome.failed
+            for line in outcome.lines:
+                tell(line)
     finally:
         remove_leftovers(out)  # temporary files of workers that were killed
     return reports, {name: failed[name] for name in series if name in failed}
 
 
-def _fit_in_processes(jobs: Sequence[Job], engine: str, workers: int | None, note: Callable[["Outcome"], None]) -> None:
+def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) -> Iterator[Outcome]:
     """Fits the channels with an engine. A channel whose worker dies repeatedly is reported and does not stop the others."""
-    waiting = {job.name: job for job in jobs}
-
-    def fit(some: Sequence[Job], workers: int | None) -> None:
-        with contextlib.closing(engines.run(engine, fit_or_say, some, workers, THREADS)) as running:
-            for outcome in running:
-                note(outcome)
-                del waiting[outcome.name]
-
-    while waiting:
+    batches = [(jobs, workers)]
+    while batches:
+        some, workers = batches.pop()
+        waiting = {job.name: job for job in some}
         try:
-            fit(list(waiting.values()), workers)
+            with contextlib.closing(engines.run(engine, fit_or_say, some, workers, THREADS)) as running:
+                for outcome in running:
+                    del waiting[outcome.name]
+                    yield outcome
         except ProcessesDiedError as died:
-            suspects = [job for job in died.items if job.name in waiting]
+            suspects = [waiting.pop(job.name) for job in died.items if job.name in waiting]
             if not suspects:
                 raise
-            for job in suspects:  # one at a time, to find the channel that kills its worker, and to give it all the memory
-                try:
-                    fit([job], 1)
-                except ProcessesDiedError:
-                    reason = (
-                        "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory. "
-                        "Give less telemetry."
-                    )
-                    note(Outcome(job.name, failed=dict.fromkeys(job.series, reason)))
-                    del waiting[job.name]
+            if len(some) == 1:
+                reason = (
+                    "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory. "
+                    "Give less telemetry."
+                )
+                yield Outcome(some[0].name, failed=dict.fromkeys(some[0].series, reason))
+                continue
+            batches += [(list(waiting.values()), workers)] if waiting else []
+            # one at a time, to find the one that kills its worker, and to give it all the memory
+            batches += [([job], 1) for job in suspects]
 
 
 def fit_or_say(job: Job) -> Outcome:
-    """Fits the channels of a job. Errors that concern only some of them are returned, not raised.
+    """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
+    from enhsim_tf.simulator.joint import join_channels
 
-    Args:
-        job: The channels.
-
-    Raises:
-        InputError: If the machine lacks disk space or memory, which affects the other channels too.
-    """
-    cleaned, failed = {}, {}
+    cleaned, outcome = {}, Outcome(job.name)
     for name, series in job.series.items():
         reason = _reason_of(name, lambda name=name, series=series: cleaned.update({name: _cleaned(name, series, job.cleaning)}))
-        failed |= {name: reason} if reason else {}
-    lines = lines_of([each.report for each in cleaned.values()])
-    reports: dict[str, dict] = {}
-    for telemetry in _on_one_clock(cleaned):
-        names = name_of_channels(list(telemetry.columns))
-        reason = _reason_of(names, lambda telemetry=telemetry: _fit_group(telemetry, cleaned, job, lines, reports))
-        failed |= dict.fromkeys(telemetry.columns, reason) if reason else {}
-    return Outcome(job.name, lines, reports, failed)
+        outcome.failed |= {name: reason} if reason else {}
+    outcome.lines += lines_of([each.report for each in cleaned.values()])
+    for telemetry in join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []:
+        names = name_of_channels(telemetry.columns)
+        reason = _reason_of(names, lambda telemetry=telemetry: _fit_group(telemetry, cleaned, job, outcome))
+        outcome.failed |= dict.fromkeys(telemetry.columns, reason) if reason else {}
+    return outcome
 
 
 def _cleaned(name: str, series: "pd.Series", cleaning: Cleaning) -> "Cleaned":
@@ -224,13 +187,6 @@ def _cleaned(name: str, series: "pd.Series", cleaning: Cleaning) -> "Cleaned":
     cleaned = clean(series, cleaning)
     check_values(np.concatenate([part.values for part in cleaned.parts]), name)
     return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
-
-
-def _on_one_clock(cleaned: "Mapping[str, Cleaned]") -> "list[Recording]":
-    """Joins the channels that can be brought onto one clock."""
-    from enhsim_tf.simulator.joint import join_channels
-
-    return join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []
 
 
 def _reason_of(name: str, work: Callable[[], None]) -> str | None:
@@ -252,12 +208,12 @@ def _reason_of(name: str, work: Callable[[], None]) -> str | None:
     return None
 
 
-def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Job, lines: list[str], reports: dict[str, dict]) -> None:
+def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Job, outcome: Outcome) -> None:
     """Fits and saves one simulator. Nothing is written if a step fails."""
+    from enhsim_tf.simulator.figures import report_figure
     from enhsim_tf.simulator.fitting import fit
-    from enhsim_tf.simulator.report_figure import report_figure
 
-    name = name_of_channels(list(telemetry.columns))
+    name = name_of_channels(telemetry.columns)
     progress = Progress(_tell_if_heard, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
     commands = job.commands if len(job.series) == 1 else None
     simulator, report = fit(telemetry, _run_of(job, telemetry), job.options, progress, commands)
@@ -268,14 +224,10 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
         simulator.save(temporary)
         write_json(temporary / "report.json", found)
         report_figure(report).savefig(temporary / "report.png", dpi=200, format="png")
-    reports[name] = found | {"folder": str(folder)}
-    lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {_shown(folder)}/"]
-
-
-def _shown(folder: Path) -> str:
-    """The folder as seen from here; its full path if it is elsewhere."""
+    outcome.reports[name] = found | {"folder": str(folder)}
     here = os.path.relpath(folder)
-    return str(folder) if here.startswith("..") else here
+    shown = folder if here.startswith("..") else here  # from here, its full path if it is elsewhere
+    outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/"]
 
 
 def _run_of(job: Job, telemetry: "Recording") -> "Recording | None":

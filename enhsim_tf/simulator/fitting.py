@@ -1,13 +1,13 @@
 """Fits an enhanced simulator to nominal telemetry, and measures it on the held-out end (sections 2.2 and 2.3)."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import Delay, estimate_delay
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
@@ -19,8 +19,7 @@ from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
 from enhsim_tf.noise.names import BEST as BEST_NOISE
 from enhsim_tf.simulator.alignment import Runs, Waves, pair_recordings
-from enhsim_tf.simulator.checks import check_size
-from enhsim_tf.simulator.coarse_choice import COMMANDS, LEAST_SAMPLES, choose_coarse
+from enhsim_tf.simulator.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse
 from enhsim_tf.simulator.detector_choice import choose_detector, judge_detectors
 from enhsim_tf.simulator.joint import cut, join_channels, long_enough, split_end, telemetry_of, times_of
 from enhsim_tf.simulator.noise_choice import JUDGED_SHARE, NoiseWindows, choose_noise
@@ -37,8 +36,10 @@ _NUM_LEVELS = 500  # most windows whose offset and gain are kept
 _LEAST_FOLLOWED = 0.1  # share of the windows that have to follow a square wave for a shape to be learnt from them
 _MOST_VALUES = 1_500_000  # of all training windows, which bounds time and memory of a fit of many channels
 _LEAST_WINDOWS = 300  # training windows, however many channels
+_LEAST_SPAN, _MOST_SIZE = 1e-12, 1e15  # beyond them, squares of the noise or of the values leave the range of float32
 
 
+@threadpool_limits.wrap(limits=1)  # several threads take longer for arrays of this size, and round differently
 def fit(
     telemetry: Telemetry | Sequence[Telemetry] | Mapping[str, Sequence[Telemetry]] | Recording,
     coarse: CoarseSimulator | None = None,
@@ -65,12 +66,16 @@ def fit(
     """
     options, recording = options or FitOptions(), _recording_of(telemetry)
     for channel, name in enumerate(recording.columns):
-        values = np.concatenate([part.values[:, channel] for part in recording.parts])
-        check_size(check_values(values, name), name)
-    with threadpool_limits(1):  # several threads take longer for arrays of this size, and round differently
-        if coarse is not None:
-            return _fit_runs(recording, coarse, options, progress)
-        return _fit_waves(recording, options, progress, commands)
+        values = check_values(np.concatenate([part.values[:, channel] for part in recording.parts]), name)
+        low, high = float(np.min(values)), float(np.max(values))
+        if not (max(-low, high) <= _MOST_SIZE and high - low >= _LEAST_SPAN):
+            raise InputError(
+                f"Expected values up to {_MOST_SIZE:g} that span at least {_LEAST_SPAN:g}. Received: {name}, from {low:g} to {high:g}. "
+                "Give it in another unit."
+            )
+    if coarse is not None:
+        return _fit_runs(recording, coarse, options, progress)
+    return _fit_waves(recording, options, progress, commands)
 
 
 def _recording_of(telemetry: Any) -> Recording:
@@ -96,38 +101,37 @@ def _fit_waves(
     recording: Recording, options: FitOptions, progress: Progress, commands: np.ndarray | None
 ) -> tuple[EnhancedSimulator, Report]:
     learnt, held_out, note = _split(recording, options.held_out)
-    refused: dict[int, str] = {}
+    channels, refused = recording.columns, {}
     while True:
+        commands = commands if len(channels) == 1 else None
         choices = [
-            choose_coarse(
-                telemetry_of(learnt, channel), options.window, commands if len(recording.columns) == 1 else None, refused.get(channel)
-            )
-            for channel in range(len(recording.columns))
+            choose_coarse(telemetry_of(learnt, channel), options.window, commands, refused.get(channel)) for channel in range(len(channels))
         ]
-        if choices[0].kind == COMMANDS:
-            traces: CommandTraces = choices[0].traces
-            run = traces.recording(commands)
+        said = [choices[0].said] if len(channels) == 1 else [f"{name}: {each.said}" for name, each in zip(channels, choices, strict=True)]
+        said = " ".join([*said, note]).strip()
+        traces = choices[0].traces
+        if traces is not None:
             chosen = dataclasses.replace(options, window=choices[0].window, held_out=options.held_out if learnt is not recording else 0.0)
-            return _fit_runs(recording, run, chosen, progress, f"{choices[0].said} {note}".strip(), traces.get_config())
+            return _fit_runs(recording, traces.recording(commands), chosen, progress, said, traces.get_config())
         window = max(each.window for each in choices)
-        if any(len(part) >= window for part in learnt.parts) and len(long_enough(learnt, window)) >= LEAST_LEARNT * window:
-            try:
-                return _fit_aligned(learnt, held_out, choices, window, options, progress, note)
-            except _FlatError as error:
-                refused[error.channel] = "nothing can be learnt from its best square wave, which its windows do not follow"
-                continue
-        raise InputError(
-            f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {len(learnt):,} samples of {recording.name}, the "
-            f"longest part {max(map(len, learnt.parts)):,}. Give more telemetry or a smaller window."
-        )
+        usable = long_enough(learnt, window)
+        if usable is None or len(usable) < LEAST_LEARNT * window:
+            raise InputError(
+                f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {len(learnt):,} samples of "
+                f"{recording.name}, the longest part {max(map(len, learnt.parts)):,}. Give more telemetry or a smaller window."
+            )
+        try:
+            return _fit_aligned(usable, long_enough(held_out, window), choices, window, options, progress, said)
+        except _FlatError as error:
+            refused[error.channel] = "nothing can be learnt from its best square wave, which its windows do not follow"
 
 
 class _FlatError(Exception):
     """Too few windows follow the square waves; the channel is that whose wave is followed least."""
 
-    def __init__(self, channel: int):
-        super().__init__(channel)
-        self.channel = channel
+    def __init__(self, is_flat: np.ndarray):
+        super().__init__()
+        self.channel = int(np.argmax(is_flat.mean(axis=0)))
 
 
 def _split(recording: Recording, share: float) -> tuple[Recording, Recording | None, str]:
@@ -148,43 +152,39 @@ def _num_windows(options: FitOptions, window: int, channels: int) -> int:
 def _fit_aligned(
     learnt: Recording,
     held_out: Recording | None,
-    choices: Sequence[Any],
+    choices: Sequence[CoarseChoice],
     window: int,
     options: FitOptions,
     progress: Progress,
-    note: str,
+    said: str,
 ) -> tuple[EnhancedSimulator, Report]:
-    usable, channels = long_enough(learnt, window), learnt.columns
-    series = [part.values for part in usable.parts]
+    channels, series = learnt.columns, [part.values for part in learnt.parts]
     number = _num_windows(options, window, len(channels))
     starts = random_window_starts(series, window, number, np.random.default_rng(options.seed))
-    targets, times = cut(series, starts, window), times_of(usable, starts, window)
+    targets, times = cut(series, starts, window), times_of(learnt, starts, window)
     waves = Waves([each.coarse for each in choices], channels, learnt.interval_s, window).on_one_clock(targets)
     waves, coarse, wanted, kept = _learn_waveforms(waves, targets, times)
     is_level = all(isinstance(each, ConstantLevel) for each in waves.simulators)
     name = options.enhancer if not is_level else COARSE
     choice = choose_enhancer(coarse, wanted, times[kept], name, options.seed, options.epochs, _told(progress))
-    simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, np.zeros((1, len(channels), 2)))
     places = evenly_spaced_starts(series, window, _NUM_LEVELS)
     shift, gain = waves.align(cut(series, places, window))[1:]
-    simulator.level_step = max(1.0, (places[-1] - places[0]) / max(1, len(places) - 1))
     is_flat = waves.is_flat(gain)
     followed = ~is_flat.any(axis=1)
     if not followed.any():
-        raise _FlatError(int(np.argmax(is_flat.mean(axis=0))))
-    simulator.levels = np.stack([shift, gain], axis=2)[followed]
-    values = np.concatenate(series)
-    simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(len(channels)))
+        raise _FlatError(is_flat)
+    step = max(1.0, (places[-1] - places[0]) / max(1, len(places) - 1))
+    levels = np.stack([shift, gain], axis=2)[followed]
+    simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, levels=levels, nominal=learnt, level_step=step)
 
     def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
         windows = cut([part.values for part in some.parts], places, window)
         clean = simulator.enhance(*waves.align(windows))
         return NoiseWindows(windows - clean, clean, times_of(some, places, window))
 
-    everything = noise_windows(usable, random_window_starts(series, window, number, np.random.default_rng([options.seed, 1])))
-    halves = tuple(_evenly(each, window, number, len(channels), noise_windows) for each in split_end(usable, JUDGED_SHARE))
-    said = _said_of(choices, channels, note)
-    return _finish(simulator, choice, halves, everything, options, usable, long_enough(held_out, window), (None, None), said, [], progress)
+    everything = noise_windows(learnt, random_window_starts(series, window, number, np.random.default_rng([options.seed, 1])))
+    halves = [_evenly(each, window, number, noise_windows) for each in split_end(learnt, JUDGED_SHARE)]
+    return _finish(simulator, choice, halves, everything, options, held_out, None, said, [], progress)
 
 
 def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tuple[Waves, np.ndarray, np.ndarray, np.ndarray]:
@@ -193,32 +193,24 @@ def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tu
     Returns:
         The waves with their waveforms; the coarse windows and the targets in units of the waves; and which windows are kept.
     """
-    for number in range(_ALIGNMENTS + 1):
+    for number in itertools.count():
         coarse, shift, gain = waves.align(targets)
         is_flat = waves.is_flat(gain)
         kept = ~is_flat.any(axis=1)
         if kept.mean() < _LEAST_FOLLOWED:
-            raise _FlatError(int(np.argmax(is_flat.mean(axis=0))))
+            raise _FlatError(is_flat)
         safe = np.where(gain != 0, gain, 1.0)
         wanted = ((targets - shift[:, None]) / safe[:, None]).astype(np.float32)
         if number == _ALIGNMENTS or all(each.is_constant for each in waves.simulators):
             return waves, coarse[kept], wanted[kept], kept
         waveforms = []
         for channel, simulator in enumerate(waves.simulators):
-            if simulator.is_constant:
-                waveforms.append(None)
-                continue
-            some = np.flatnonzero(kept)[:_NUM_WAVEFORM]
-            ridge = fit_enhancer(RIDGE, coarse[some][:, :, [channel]], wanted[some][:, :, [channel]], times[some])
-            waveforms.append(ridge.predict(waves.phases(channel)[:, :, None])[:, :, 0])
+            waveforms.append(None)
+            if not simulator.is_constant:
+                some = np.flatnonzero(kept)[:_NUM_WAVEFORM]
+                ridge = fit_enhancer(RIDGE, coarse[some][:, :, [channel]], wanted[some][:, :, [channel]], times[some])
+                waveforms[-1] = ridge.predict(waves.phases(channel)[:, :, None])[:, :, 0]
         waves = Waves(waves.simulators, waves.channels, waves.interval_s, waves.window, waveforms)
-    raise AssertionError("the loop returns")
-
-
-def _said_of(choices: Sequence[Any], channels: Sequence[str], note: str) -> str:
-    if len(channels) == 1:
-        return f"{choices[0].said} {note}".strip()
-    return " ".join([*(f"{name}: {each.said}" for name, each in zip(channels, choices, strict=True)), note]).strip()
 
 
 # runs of the user's simulator
@@ -243,13 +235,9 @@ def _fit_runs(
             f"{len(paired):,} of {len(recording):,} samples of the telemetry have a coarse run of the same time; the others are not used"
         )
     run_there, left_out = _without_constant(run_there)
-    paired, run_there = long_enough(paired, window), long_enough(run_there, window)
-    halves = (
-        [(None, None), (None, None)]
-        if paired is None
-        else list(zip(*(split_end(each, options.held_out) for each in (paired, run_there)), strict=True))
+    (learnt, held_out), (learnt_run, held_out_run) = (
+        [long_enough(each, window) for each in split_end(long_enough(some, window), options.held_out)] for some in (paired, run_there)
     )
-    (learnt, learnt_run), (held_out, held_out_run) = (tuple(long_enough(each, window) for each in half) for half in halves)
     if learnt is None or len(learnt) < LEAST_LEARNT * window:
         raise InputError(
             f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {0 if learnt is None else len(learnt):,} samples that "
@@ -262,31 +250,15 @@ def _fit_runs(
     choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, _told(progress))
     known = None if isinstance(coarse, Recording) else coarse
     alignment = Runs(learnt_run, window, delay.seconds, known, name_of(coarse), commands)
-    simulator = EnhancedSimulator(alignment, choice.enhancer, None, recording.columns, recording.interval_s, nominal=None)
-    values = np.concatenate(series)
-    simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(values.shape[1]))
-    residuals = _held_out_residuals(simulator, learnt, learnt_run, choice, inputs, targets, times, options)
+    simulator = EnhancedSimulator(alignment, choice.enhancer, None, recording.columns, recording.interval_s, nominal=learnt)
+    residuals = _held_out_residuals(simulator, choice, inputs, targets, times, options)
 
     def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
         noise, clean = np.split(cut([part.values for part in some.parts], places, window), 2, axis=2)
         return NoiseWindows(noise, clean, times_of(some, places, window))
 
-    halves = (None, None) if residuals is None else split_end(residuals, JUDGED_SHARE)
-    everything, *judged = (_evenly(some, window, number, len(recording.columns), noise_windows) for some in (residuals, *halves))
-    return _finish(
-        simulator,
-        choice,
-        tuple(judged),
-        everything,
-        options,
-        learnt,
-        held_out,
-        (learnt_run, held_out_run),
-        said,
-        [*notes, *left_out],
-        progress,
-        with_signal=False,
-    )
+    everything, *judged = (_evenly(some, window, number, noise_windows) for some in (residuals, *split_end(residuals, JUDGED_SHARE)))
+    return _finish(simulator, choice, judged, everything, options, held_out, held_out_run, said, [*notes, *left_out], progress)
 
 
 def _run_of(coarse: CoarseSimulator, recording: Recording) -> tuple[Recording, list[str]]:
@@ -312,39 +284,31 @@ def _on_delay(delay: Delay, telemetry: Telemetry, was_given: bool) -> str:
         return f"delay: {delay.seconds:g} {unit} as given, {samples:g} samples"
     if delay.column is None:
         return "delay: none could be estimated, because no coarse column is correlated with the telemetry; 0 is used"
-    later = "later than" if delay.seconds >= 0 else "earlier than"
     if not delay.seconds:
         return f"delay: none found; the correlation with {delay.column!r} is largest without one ({delay.correlation:.3f})"
     return (
-        f"delay: the telemetry is {abs(delay.seconds):g} {unit} ({abs(samples):g} samples) {later} the coarse run; the correlation with "
-        f"{delay.column!r} is {delay.correlation:.3f} there and {delay.undelayed:.3f} without the delay"
+        f"delay: the telemetry is {abs(delay.seconds):g} {unit} ({abs(samples):g} samples) {'later' if samples > 0 else 'earlier'} than the coarse run; "
+        f"the correlation with {delay.column!r} is {delay.correlation:.3f} there and {delay.undelayed:.3f} without the delay"
     )
 
 
 def _without_constant(run: Recording) -> tuple[Recording, list[str]]:
     """Leaves out coarse columns that never vary, because an enhancer learns nothing from them."""
     varies = np.ptp(np.concatenate([part.values for part in run.parts]), axis=0) > 0
-    gone = [name for name, does in zip(run.columns, varies, strict=True) if not does]
-    if not varies.any():
+    kept, gone = ([name for name, does in zip(run.columns, varies, strict=True) if does == wanted] for wanted in (True, False))
+    if not kept:
         raise InputError(f"Expected a coarse column that varies. Received: only constant ones in {run.name}: {', '.join(gone)[:120]}.")
-    kept = [name for name, does in zip(run.columns, varies, strict=True) if does]
     return run.select(kept), [f"coarse columns left out, because they never vary: {', '.join(gone)}"] if gone else []
 
 
 def _held_out_residuals(
-    simulator: EnhancedSimulator,
-    learnt: Recording,
-    run: Recording,
-    choice: Choice,
-    inputs: np.ndarray,
-    targets: np.ndarray,
-    times: np.ndarray,
-    options: FitOptions,
+    simulator: EnhancedSimulator, choice: Choice, inputs: np.ndarray, targets: np.ndarray, times: np.ndarray, options: FitOptions
 ) -> Recording | None:
     """Returns residual and enhanced run of all blocks of time, side by side, each from an enhancer that was not fitted to that block.
 
     Residuals of the telemetry that an enhancer has learnt from are too small, because it has learnt part of their noise.
     """
+    learnt, run = simulator.nominal, simulator.nominal_run
     window, found = simulator.window, []
     for fold in range(NUM_FOLDS):
         enhancer: Enhancer = choice.without_fold
@@ -367,12 +331,12 @@ def _held_out_residuals(
 
 
 def _evenly(
-    recording: Recording | None, window: int, number: int, channels: int, windows_at: Callable[[Recording, np.ndarray], NoiseWindows]
+    recording: Recording | None, window: int, number: int, windows_at: Callable[[Recording, np.ndarray], NoiseWindows]
 ) -> NoiseWindows:
     """Windows of noise that are evenly spaced over a recording; none if it has no part that is long enough."""
     usable = long_enough(recording, window)
     if usable is None:
-        return NoiseWindows(*np.zeros((2, 0, window, channels), np.float32), np.zeros(0, int))
+        return NoiseWindows(*np.zeros((2, 0, window, 1), np.float32), np.zeros(0, int))
     return windows_at(usable, evenly_spaced_starts([part.values for part in usable.parts], window, number))
 
 
@@ -386,38 +350,39 @@ def _told(progress: Progress) -> Any:
 def _finish(
     simulator: EnhancedSimulator,
     choice: Choice,
-    halves: tuple[NoiseWindows, NoiseWindows],
+    halves: Sequence[NoiseWindows],
     everything: NoiseWindows,
     options: FitOptions,
-    learnt: Recording,
     held_out: Recording | None,
-    runs: tuple[Recording | None, Recording | None],
+    held_out_run: Recording | None,
     said: str,
     notes: list[str],
     progress: Progress,
-    with_signal: bool = True,
 ) -> tuple[EnhancedSimulator, Report]:
     """Fits the noise and chooses the detector. What held-out time contradicts is not shipped: the next noise model is taken then."""
+    learnt, run = simulator.nominal, simulator.nominal_run
+    values = np.concatenate([part.values for part in learnt.parts])
+    simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(values.shape[1]))
     progress.step("noise")
     is_there = bool(np.std(everything.noise, dtype=np.float64) > 0)  # noise of size 0 cannot be judged
     rows: list[dict[str, Any]] = []
+    used = options.noise if options.noise != BEST_NOISE else "residual windows"
     if options.noise != BEST_NOISE or not is_there:
-        simulator.noise = everything.fit(options.noise if options.noise != BEST_NOISE else "residual windows")
+        simulator.noise = everything.fit(used)
     else:
-        simulator.noise, rows, noted = choose_noise(*halves, everything, options.seed, simulator.quantisation, with_signal)
+        simulator.noise, rows, noted = choose_noise(*halves, everything, options.seed, simulator.quantisation, run is None)
+        used = next((row["name"] for row in rows if row["is_chosen"]), used)
         notes += noted
-    simulator.nominal = learnt
     progress.step("detectors")
-    judged_on, judged_runs = (learnt, (runs[0], runs[0])) if held_out is None else (held_out, runs)
-    detectors = judge_detectors(simulator, learnt, judged_on, judged_runs, options.seed)
+    judged_on, judged_run = (learnt, run) if held_out is None else (held_out, held_out_run)
+    detectors = judge_detectors(simulator, judged_on, judged_run, options.seed)
     chosen = choose_detector(detectors)
-    used = next((row["name"] for row in rows if row["is_chosen"]), options.noise if options.noise != BEST_NOISE else "residual windows")
     if not chosen.keeps and options.noise == BEST_NOISE and used not in ("residual windows", "matched residual windows"):
         notes.append(f"noise model {used} is not used, because held-out time contradicts it; whole residual windows are drawn")
         simulator.noise, used = everything.fit("residual windows"), "residual windows"
         for name in ("noise_sd", "scale"):
             vars(simulator).pop(name, None)
-        detectors = judge_detectors(simulator, learnt, judged_on, judged_runs, options.seed)
+        detectors = judge_detectors(simulator, judged_on, judged_run, options.seed)
         chosen = choose_detector(detectors)
     simulator.trained = {
         "telemetry": learnt.name,
@@ -428,24 +393,21 @@ def _finish(
         "keeps_promise": bool(chosen.keeps),
         "false_alarms": chosen.false_alarms,
     }
-    report = make_report(
-        simulator, choice, rows, detectors, learnt, judged_on, judged_runs, held_out is not None, said, notes, options.seed
-    )
-    if runs[1] is not None or held_out is not None:  # thresholds know all nominal telemetry that was given
+    report = make_report(simulator, choice, rows, detectors, judged_on, judged_run, held_out is not None, said, notes, options.seed)
+    if held_out is not None:  # thresholds know all nominal telemetry that was given
         simulator.nominal = _joined(learnt, held_out)
-        if simulator.is_run_model:
-            simulator.alignment.nominal = _joined(*runs)
+        if run is not None:
+            simulator.alignment.nominal = _joined(run, held_out_run)
             vars(simulator).pop("_nominal_clean", None)
     return simulator, report
 
 
-def _joined(first: Recording, second: Recording | None) -> Recording:
+def _joined(first: Recording, second: Recording) -> Recording:
     """Puts the end of telemetry behind its beginning again; parts that meet become one."""
     parts = list(first.parts)
-    for part in () if second is None else second.parts:
+    for part in second.parts:
         last = parts[-1]
-        meets = abs(last.offset_s + len(last) * first.interval_s - part.offset_s) < 0.5 * first.interval_s
-        if meets:
+        if abs(last.offset_s + len(last) * first.interval_s - part.offset_s) < 0.5 * first.interval_s:
             parts[-1] = Run(np.concatenate([last.values, part.values]), last.offset_s)
         else:
             parts.append(part)

@@ -1,12 +1,14 @@
 """Channels of one source on one clock: telemetry of several channels is a `Recording` whose columns are the channels."""
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 from enhsim_tf.telemetry.windows import places_in_parts
 
@@ -34,12 +36,14 @@ def join_channels(channels: Mapping[str, Sequence[Telemetry] | Telemetry]) -> li
     for name, each in parts.items():
         for part in each:
             check_telemetry(part)
-        alike = (group for group in groups if _is_alike(parts[group[0]][0], each[0]))
-        group = next(alike, None)
-        if group is None:
-            groups.append([name])
+        own = each[0]
+        for group in groups:
+            first = parts[group[0]][0]
+            if first.has_time == own.has_time and abs(first.interval_s / own.interval_s - 1) <= SAME_RATE:
+                break
         else:
-            group.append(name)
+            groups.append(group := [])
+        group.append(name)
     found = []
     for group in groups:
         joined = _joined({name: parts[name] for name in group})
@@ -50,64 +54,31 @@ def join_channels(channels: Mapping[str, Sequence[Telemetry] | Telemetry]) -> li
 
 
 def telemetry_of(recording: Recording, channel: int = 0) -> list[Telemetry]:
-    """Returns the parts of one channel.
-
-    Args:
-        recording: Telemetry of one or several channels.
-        channel: Number of the channel.
-    """
+    """Returns the parts of one channel, given by its number."""
     interval_s, start, name = recording.interval_s, recording.start, recording.columns[channel]
     return [Telemetry(part.values[:, channel], interval_s, part.offset_s, start, name) for part in recording.parts]
-
-
-def _is_alike(first: Telemetry, second: Telemetry) -> bool:
-    return first.has_time == second.has_time and abs(first.interval_s / second.interval_s - 1) <= SAME_RATE
 
 
 def _joined(channels: Mapping[str, Sequence[Telemetry]]) -> Recording | None:
     """Returns the stretches that all channels cover; None if there are none."""
     first = next(iter(channels.values()))[0]
     interval_s, zero = first.interval_s, nanoseconds(dataclasses.replace(first, offset_s=0.0), 0, 1)[0]
-    spans, placed = None, []
-    for parts in channels.values():
-        begins = [round(float(nanoseconds(part, 0, 1)[0] - zero) / 1e9 / interval_s) for part in parts]
-        own = [(begin, begin + len(part)) for begin, part in zip(begins, parts, strict=True)]
-        placed.append(list(zip(begins, parts, strict=True)))
-        spans = own if spans is None else _shared(spans, own)
-    if not spans:
-        return None
+    placed = [[(round(float(nanoseconds(part, 0, 1)[0] - zero) / 1e9 / interval_s), part) for part in parts] for parts in channels.values()]
+    edges = sorted(edge for own in placed for begin, part in own for edge in ((begin, 1), (begin + len(part), -1)))
+    covering = itertools.accumulate(change for _, change in edges)  # number of channels that cover the time after each edge
     runs = []
-    for low, high in spans:
-        columns = []
-        for own in placed:
-            begin, part = next((begin, part) for begin, part in own if begin <= low and high <= begin + len(part))
-            columns.append(part.values[low - begin : high - begin])
-        runs.append(Run(np.stack(columns, axis=1).astype(np.float32), low * interval_s))
+    for ((low, _), (high, _)), number in zip(itertools.pairwise(edges), covering, strict=False):
+        if number == len(placed) and low < high:
+            columns = [part.values[low - begin : high - begin] for own in placed for begin, part in own if begin <= low < begin + len(part)]
+            runs.append(Run(np.stack(columns, axis=1).astype(np.float32), low * interval_s))
     names = tuple(channels)
-    return Recording(tuple(runs), names, interval_s, first.start, ", ".join(names))
+    return Recording(tuple(runs), names, interval_s, first.start, ", ".join(names)) if runs else None
 
 
-def _shared(first: Sequence[tuple[int, int]], second: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Returns the intersections of two ascending lists of spans."""
-    found, place = [], 0
-    for low, high in first:
-        while place < len(second) and second[place][1] <= low:
-            place += 1
-        other = place
-        while other < len(second) and second[other][0] < high:
-            span = max(low, second[other][0]), min(high, second[other][1])
-            found += [span] if span[0] < span[1] else []
-            other += 1
-    return found
-
-
-def split_end(recording: Recording, share: float) -> tuple[Recording | None, Recording | None]:
-    """Splits telemetry into its beginning and its end.
-
-    Args:
-        recording: The telemetry.
-        share: Share of the samples that belong to the end, below 1. With 0 there is no end.
-    """
+def split_end(recording: Recording | None, share: float) -> tuple[Recording | None, Recording | None]:
+    """Splits telemetry into its beginning and its end, which has this share of the samples, below 1; None for what has no sample."""
+    if recording is None:
+        return None, None
     left = len(recording) - round(share * len(recording))
     first, rest = [], []
     for part in recording.parts:
@@ -125,15 +96,9 @@ def long_enough(recording: Recording | None, window: int) -> Recording | None:
 
 
 def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.ndarray:
-    """Cuts windows out of contiguous series.
+    """Cuts windows out of contiguous series of shape `(samples, columns)`, float32 of shape `(windows, samples, columns)`.
 
-    Args:
-        series: Arrays of shape `(samples, columns)`.
-        starts: Start of each window, counted over all possible starts as in `telemetry.windows`.
-        window: Length of a window in samples.
-
-    Returns:
-        float32 array of shape `(windows, samples, columns)`.
+    Starts are counted over all possible starts, as in `telemetry.windows`.
     """
     usable = [each for each in series if len(each) >= window]
     which, places = places_in_parts(usable, starts, window)
@@ -150,3 +115,22 @@ def times_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarra
     usable = [part for part in recording.parts if len(part) >= window]
     which, places = places_in_parts(usable, starts, window)
     return np.array([round(part.offset_s / recording.interval_s) for part in usable])[which] + places
+
+
+def spread_of(windows: np.ndarray) -> np.ndarray:
+    """Returns the standard deviation of each channel of windows, float64; 1 where it is 0."""
+    deviation = np.std(windows, axis=(0, 1), dtype=np.float64)
+    return np.where(deviation > 0, deviation, 1.0)
+
+
+def nrmse(estimate: np.ndarray, windows: np.ndarray) -> np.ndarray:
+    """Returns the root-mean-square error of each channel, divided by the standard deviation of its windows."""
+    return np.sqrt(np.mean((estimate - windows) ** 2, axis=(0, 1), dtype=np.float64)) / spread_of(windows)
+
+
+def rounded(values: np.ndarray, quantisation: Sequence[Levels | None]) -> np.ndarray:
+    """Rounds quantised channels, the last axis, to their levels in place, and returns the values."""
+    for channel, levels in enumerate(quantisation):
+        if levels is not None:
+            values[..., channel] = levels.round(values[..., channel])
+    return values

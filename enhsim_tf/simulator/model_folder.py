@@ -1,110 +1,153 @@
-"""Finds and names the folders of fitted models."""
+"""Folders of fitted simulators: how they are named and found, and how a simulator is written to one and read again.
+
+A simulator is `arrays.npz`, `settings.json`, and `manifest.json` with the format and the checksums of both. Everything with more than a few
+numbers is an array. No code is saved.
+"""
 
 import os
 import urllib.parse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from enhsim_tf.common.atomic_files import encode_name
+import numpy as np
+
+from enhsim_tf.common.atomic_files import encode_name, replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.simulator.saving import MANIFEST, is_foreign, settings_of
+from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json
 
-_MOST_BYTES = 60  # of the name of a folder
+MANIFEST, _SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
+_MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
+_MOST_ARRAYS = 2**28  # maximum bytes of all arrays; the weights of the paper's network are 55 MB
+_MOST_NAME = 60  # bytes of the name of a folder
+_NUMBER = "3"  # of the format
+_FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
-    """Returns the folder of a channel. Its name is the channel's name, percent-encoded.
-
-    Args:
-        models: Folder of all models.
-        channel: Name of the channel.
-
-    Raises:
-        InputError: If the name is empty or too long for a folder.
-    """
+    """Returns the folder of a channel: its name, percent-encoded. An `InputError` refuses names that are empty or too long."""
     return Path(models) / encode_name(channel)
 
 
 def name_of_channels(channels: Sequence[str]) -> str:
-    """Returns the name of a model: that of its channel, or those of its channels joined by `~`, shortened if there are many.
-
-    Args:
-        channels: Names of the channels.
-    """
+    """Returns the name of a model: that of its channel, or those of its channels joined by `~`, shortened if there are many."""
     joined = "~".join(channels)
-    return joined if len(channels) == 1 or len(joined.encode()) <= _MOST_BYTES else f"{channels[0]}~{len(channels) - 1} more"
-
-
-def channels_of(folder: Path) -> tuple[str, ...]:
-    """Returns the names of the channels of a saved simulator without loading it.
-
-    Args:
-        folder: The folder of the simulator.
-
-    Raises:
-        InputError: If the folder was not written by `EnhancedSimulator.save`.
-    """
-    names = settings_of(folder).get("channels")
-    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-        raise InputError(f"Expected the names of channels in settings.json. Received: {str(names)[:80]} in {folder}. Fit it again.")
-    return tuple(names)
+    return joined if len(channels) == 1 or len(joined.encode()) <= _MOST_NAME else f"{channels[0]}~{len(channels) - 1} more"
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:
-    """Returns the fitted channels in a folder.
-
-    Args:
-        models: Folder of all models, or the folder of one saved simulator.
-
-    Returns:
-        A dictionary from the names of the channels to their folders.
-
-    Raises:
-        InputError: If the folder contains no saved simulator.
-    """
+    """Returns the folders of the fitted simulators in a folder, or of the one that it is, by name; raises InputError if there is none."""
     models = Path(os.path.abspath(models))  # so that "." has a name too
     if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
-    folders = sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else []
-    if not folders:
+    found = {
+        urllib.parse.unquote(manifest.parent.name): manifest.parent
+        for manifest in (sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else [])
+    }
+    if not found:
         raise InputError(
             f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which contains none. Make one with `fit`."
         )
-    found: dict[str, Path] = {}
-    for folder in (manifest.parent for manifest in folders):
-        name = urllib.parse.unquote(folder.name)
-        if name in found:
-            raise InputError(
-                f"Expected one folder per channel. Received: {found[name].name} and {folder.name}, both of {name!r}. Remove one."
-            )
-        found[name] = folder
     return found
 
 
 def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dict[str, Path]:
-    """Selects fitted channels by name.
-
-    Args:
-        models: All fitted channels, as returned by `models_of`.
-        channels: Names of the channels to select. None or an empty sequence selects all.
-
-    Raises:
-        InputError: If there is no fitted channel of one of the names.
-    """
+    """Selects models of `models_of` by name; None or an empty sequence selects all. Raises InputError for a name that there is not."""
     unknown = [name for name in channels or () if name not in models]
     if unknown:
         raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
     return {name: models[name] for name in channels or models}
 
 
-def refuse_foreign(folder: Path) -> None:
-    """Checks that a folder is new, empty or a saved simulator, so that it may be replaced.
+def refuse_foreign(folder: str | os.PathLike) -> None:
+    """Raises InputError unless a folder is new, empty or a saved simulator, so that it may be replaced. A damaged simulator counts as one."""
+    folder, is_ours = Path(folder), False
+    if (folder / MANIFEST).is_file():  # other programs write files of this name too
+        with open(folder / MANIFEST, "rb") as file:
+            is_ours = f'"{_FAMILY}'.encode() in file.read(1_000)
+    if os.path.lexists(folder) and not is_ours and not (folder.is_dir() and not any(folder.iterdir())):
+        raise InputError(
+            f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which contains something else. "
+            "Give another folder, or another --out."
+        )
+
+
+def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> None:
+    """Writes a simulator to a folder atomically: if a step fails, the folder is left unchanged. A simulator that was there is replaced.
 
     Args:
         folder: The folder.
+        arrays: For each part of the simulator, such as `enhancer`, its arrays by name.
+        settings: All other settings, in plain JSON types.
 
     Raises:
-        InputError: If the folder contains something else.
+        InputError: If the folder contains something other than a saved simulator, or if a number is not finite.
     """
-    if is_foreign(folder):
-        raise InputError(f"Expected a folder for models. Received: {folder}, which contains something else. Give another --out.")
+    refuse_foreign(folder)
+    bad = [part for part, named in arrays.items() if not all(np.isfinite(each).all() for each in named.values())]
+    with replace_folder(folder) as temporary:
+        try:
+            write_json(temporary / _SETTINGS, settings)
+        except ValueError:  # JSON has no NaN and no infinity
+            bad.append("settings")
+        if bad:
+            raise InputError(
+                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. It was not saved. Fit it again."
+            )
+        np.savez(temporary / _ARRAYS, **{f"{part}/{name}": each for part, named in arrays.items() for name, each in named.items()})
+        checksums = {name: sha256(temporary / name) for name in (_ARRAYS, _SETTINGS)}
+        write_json(temporary / MANIFEST, {"format": _FAMILY + _NUMBER, "sha256": checksums})
+
+
+def check_saved(folder: str | os.PathLike) -> None:
+    """Raises InputError if a folder was not written by `write_saved`, or if a file in it has changed since."""
+    folder = Path(folder)
+    manifest = settings_of(folder, MANIFEST)
+    found = str(manifest.get("format"))
+    if found != _FAMILY + _NUMBER:
+        number = found.removeprefix(_FAMILY)[:80]
+        raise InputError(f"Expected a model of format {_NUMBER}. Received: format {number} in {folder}. Fit it again.")
+    if manifest.get("sha256") != {name: sha256(folder / name) if (folder / name).is_file() else "" for name in (_ARRAYS, _SETTINGS)}:
+        raise InputError(
+            f"Expected {_ARRAYS} and {_SETTINGS} to be unchanged since they were saved. Received: a missing or damaged file in {folder}. "
+            "Fit it again."
+        )
+
+
+def settings_of(folder: str | os.PathLike, name: str = _SETTINGS) -> dict[str, Any]:
+    """Reads the settings of a saved simulator, or another JSON file beside them; raises InputError if it cannot be read."""
+    try:
+        content = read_json(Path(folder) / name, _MOST_SETTINGS)
+        if not isinstance(content, dict):
+            raise ValueError("not a JSON object")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__} in {name})."
+        ) from None
+    return content
+
+
+def channels_of(folder: str | os.PathLike) -> tuple[str, ...]:
+    """Returns the names of the channels of a saved simulator without loading it; raises InputError if it is none."""
+    names = settings_of(folder).get("channels")
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise InputError(f"Expected the names of channels in settings.json. Received: {str(names)[:80]} in {folder}. Fit it again.")
+    return tuple(names)
+
+
+def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, Mapping[str, np.ndarray]], Mapping[str, Any]], Any]) -> Any:
+    """Loads a saved simulator, which `make` creates from the arrays of each part and the settings; raises InputError as `check_saved`."""
+    folder = Path(folder)
+    check_saved(folder)
+    settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
+    try:
+        arrays: dict[str, dict[str, np.ndarray]] = {}
+        for name, each in load_npz(folder / _ARRAYS, _MOST_ARRAYS).items():
+            part, _, rest = name.partition("/")
+            arrays.setdefault(part, {})[rest] = each
+        if sha256(folder / MANIFEST) != as_checked:  # another process replaced the model, so the settings may be those of the other
+            raise ValueError("the simulator was replaced while it was read; try again")
+        return make(arrays, settings)
+    except READ_ERRORS as error:
+        reason = (str(error).splitlines() or [""])[0]
+        raise InputError(f"Expected the arrays and settings of a model. Received: {folder} ({reason}).") from None

@@ -22,6 +22,7 @@ from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inj
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.noise.candidates import NoiseModel, fit_candidate
 from enhsim_tf.noise.names import CANDIDATES
+from enhsim_tf.simulator.joint import rounded, spread_of
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.windows import disjoint_rows
 
@@ -31,7 +32,7 @@ MAX_RECALL_LOSS = 0.03  # by which its mean recall may be below that of detector
 TOLD_APART = 0.8  # AUC above which generated noise must not be used without a warning
 JUDGED_SHARE = 0.25  # of the time, at its end, on which candidates are judged
 MOST_JUDGED = 1_000  # windows
-_CHEAP = ("PCA residual", "isolation forest")
+_CHEAP, _RATE = ("PCA residual", "isolation forest"), 0.01  # detectors, and the false-alarm rate for which their thresholds are set
 _LEAST_WINDOWS = 20
 _NUM_ANOMALOUS = 60  # windows with anomalies, for each kind and severity
 _ENOUGH_PIECES, _LEAST_PIECE = 200, 16  # disjoint pieces that the classifier should see, and their least length in samples
@@ -40,12 +41,9 @@ _DRAW = 73  # number of the random draw
 
 @dataclasses.dataclass(frozen=True)
 class NoiseWindows:
-    """Windows of noise and the enhanced windows below them.
+    """Windows of noise and the enhanced windows below them, of shape `(windows, samples, channels)` or without the last axis.
 
-    Args:
-        noise: Telemetry minus enhanced signal, shape `(windows, samples, channels)` or without the last axis, in the telemetry's unit.
-        clean: Enhanced windows of the same shape.
-        starts: First sample of each window, shape `(windows,)`. Needed to judge with these windows.
+    The noise is telemetry minus enhanced signal; `starts` are the first samples of the windows, which generated noise does not need.
     """
 
     noise: np.ndarray
@@ -54,12 +52,16 @@ class NoiseWindows:
 
     @functools.cached_property
     def disjoint(self) -> "NoiseWindows":
-        """Those windows that share no sample."""
-        return self.at(disjoint_rows(self.starts, self.noise.shape[1]))
+        """Those windows that share no sample; all of generated noise."""
+        return self if self.starts is None else self.at(disjoint_rows(self.starts, self.noise.shape[1]))
 
     def at(self, rows: np.ndarray) -> "NoiseWindows":
         """Some of the windows."""
         return NoiseWindows(self.noise[rows], self.clean[rows], None if self.starts is None else self.starts[rows])
+
+    def evenly(self, number: int) -> "NoiseWindows":
+        """So many of the windows, evenly spaced."""
+        return self.at(np.linspace(0, len(self) - 1, number).astype(int))
 
     def fit(self, name: str) -> NoiseModel:
         """Fits the candidate of a name to these windows."""
@@ -137,12 +139,9 @@ def choose_noise(
         The noise model; for each candidate that was tried the fields of `CandidateJudgement`, `passes` and `is_chosen`; and what is to be
         said. The list is empty if there is too little telemetry to judge; whole residual windows are drawn then.
     """
-    if min(len(judged), len(learnt)) < _LEAST_WINDOWS or len(pieces_of(learnt, learnt, judged)[0]) < _LEAST_WINDOWS:
-        return (
-            everything.fit("residual windows"),
-            [],
-            ["there is too little telemetry to judge noise models; whole residual windows are drawn"],
-        )
+    if min(len(judged), len(learnt)) < _LEAST_WINDOWS or len(pieces_of(learnt, judged)[0]) < _LEAST_WINDOWS:
+        note = "there is too little telemetry to judge noise models; whole residual windows are drawn"
+        return everything.fit("residual windows"), [], [note]
     judgements, notes, judge = [], [], HeldOutJudge(learnt, judged, seed, quantisation, with_signal)
     models: dict[str, NoiseModel] = {}
     for number, name in enumerate(CANDIDATES):
@@ -169,44 +168,24 @@ class HeldOutJudge:
 
     The classifier sees disjoint windows only, cut into pieces if there are few of them: it recognises single windows that overlap, whatever
     their noise is like. Of each candidate as many are generated: of more, some would repeat real noise if it draws real windows again.
-
-    Args:
-        learnt: Windows from which the models are fitted, in the order of time.
-        judged: Windows that they have not seen, in the order of time.
-        seed: Seed of the classifier, the detectors and the positions of the anomalies.
-        quantisation: Levels of each channel, or None.
-        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
-        rate: False-alarm rate for which thresholds are set.
+    The arguments are those of `choose_noise`.
     """
 
     def __init__(
-        self,
-        learnt: NoiseWindows,
-        judged: NoiseWindows,
-        seed: int,
-        quantisation: Sequence[Levels | None] = (),
-        with_signal: bool = True,
-        rate: float = 0.01,
+        self, learnt: NoiseWindows, judged: NoiseWindows, seed: int, quantisation: Sequence[Levels | None] = (), with_signal: bool = True
     ):
         number = min(len(judged), len(learnt), MOST_JUDGED)
-        if number < _LEAST_WINDOWS:
-            raise InputError(
-                f"Expected at least {_LEAST_WINDOWS} windows of each kind. Received: {number}. Use more telemetry or shorter windows."
-            )
-        first, last = (each.at(np.linspace(0, len(each) - 1, number).astype(int)) for each in (learnt, judged))
-        self.rate, self.seed, self._with_signal, self._quantisation = rate, seed, with_signal, tuple(quantisation)
-        self._clean, self._learnt, self._held_out = first.clean, learnt, judged
+        first, self._learnt, self._held_out = learnt.evenly(number), learnt, judged
+        self.seed, self._with_signal, self._quantisation = seed, with_signal, tuple(quantisation)
         few = min(number, len(learnt.disjoint), len(judged.disjoint))
-        self._few = first.clean[np.linspace(0, number - 1, few).astype(int)]
-        pieces = pieces_of(learnt, learnt, judged)
-        self._unit = unit_of(pieces[1].noise)
-        self._edges = [signal_edges(each) for each in _channels(pieces[1].clean)]
-        self._held_out_features = self._features(pieces[2])
-        self.real_auc = boosted_trees(self._features(pieces[1]), self._held_out_features, seed).auc
-        self._noise_sd = unit_of(first.noise)
-        nominal = self._seen(last)
-        self._nominal = nominal
-        self._anomalous = np.concatenate(list(anomalous_windows(nominal, self._noise_sd, seed, _NUM_ANOMALOUS).values()))
+        self._clean, self._few = first.clean, first.evenly(few).clean
+        real, held_out = pieces_of(learnt, judged)
+        self._unit = spread_of(real.noise)
+        self._edges = [signal_edges(each) for each in _channels(real.clean)]
+        self._held_out_features = self._features(held_out)
+        self.real_auc = boosted_trees(self._features(real), self._held_out_features, seed).auc
+        self._noise_sd, self._nominal = spread_of(first.noise), self._seen(judged.evenly(number))
+        self._anomalous = np.concatenate(list(anomalous_windows(self._nominal, self._noise_sd, seed, _NUM_ANOMALOUS).values()))
         self.real_alarms, self.real_recall = self._detected(self._seen(first))
 
     def _features(self, windows: NoiseWindows) -> np.ndarray:
@@ -236,28 +215,18 @@ class HeldOutJudge:
         for name in _CHEAP:
             detector = DETECTORS[name](self.seed).fit(training[:half])
             # an infinite threshold would silence all candidates
-            threshold, _ = metrics.finite_threshold(detector.score(training[half:]), self.rate)
+            threshold, _ = metrics.finite_threshold(detector.score(training[half:]), _RATE)
             rates.append(metrics.false_alarm_rate(detector.score(nominal), threshold))
             recalls.append(metrics.recall(detector.score(anomalous), threshold))
         return float(np.mean(rates)), float(np.mean(recalls))
 
     def _noise_on(self, clean: np.ndarray, model: NoiseModel, rng: np.random.Generator) -> NoiseWindows:
         # sums of 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
-        generated = clean + model.generate(len(clean), rng, clean)
-        for channel, levels in enumerate(self._quantisation):
-            if levels is not None:
-                generated[..., channel] = levels.round(generated[..., channel])
+        generated = rounded(clean + model.generate(len(clean), rng, clean), self._quantisation)
         return NoiseWindows(generated - clean, clean)
 
     def judge(self, name: str, model: NoiseModel, rng: np.random.Generator, in_full: bool = True) -> CandidateJudgement:
-        """Judges a fitted noise model.
-
-        Args:
-            name: Its name.
-            model: The noise model.
-            rng: Random generator of its noise.
-            in_full: Whether the classifier, which takes longest, is asked where false alarms or recall have decided.
-        """
+        """Judges a fitted noise model; `in_full` asks the classifier, which takes longest, also where false alarms or recall have decided."""
         noise = self._noise_on(self._clean, model, rng)
         alarms, recall = self._detected(self._seen(noise))
         is_close = alarms - self.real_alarms <= MAX_ALARM_EXCESS and self.real_recall - recall <= MAX_RECALL_LOSS
@@ -265,24 +234,13 @@ class HeldOutJudge:
         return CandidateJudgement(name, auc, self.real_auc, alarms, self.real_alarms, recall, self.real_recall)
 
     def classify(self, model: NoiseModel, rng: np.random.Generator) -> float:
-        """Returns the AUC of a classifier that separates windows with the model's noise from held-out real ones.
-
-        Args:
-            model: The noise model.
-            rng: Random generator of its noise.
-        """
-        pieces = pieces_of(self._noise_on(self._few, model, rng), self._learnt, self._held_out)[0]
+        """Returns the AUC of a classifier that separates windows with the model's noise from held-out real ones."""
+        pieces = pieces_of(self._learnt, self._held_out, self._noise_on(self._few, model, rng))[-1]
         return boosted_trees(self._features(pieces), self._held_out_features, self.seed).auc
 
 
 def _channels(windows: np.ndarray) -> list[np.ndarray]:
     return [windows] if windows.ndim == 2 else [windows[:, :, channel] for channel in range(windows.shape[2])]
-
-
-def unit_of(noise: np.ndarray) -> np.ndarray:
-    """The standard deviation of noise, that of each channel for several ones; 1 where it is 0."""
-    deviation = np.std(noise, axis=(0, 1), dtype=np.float64)
-    return np.where(deviation > 0, deviation, 1.0)
 
 
 def anomalous_windows(
@@ -296,9 +254,6 @@ def anomalous_windows(
         seed: Seed of positions and channels.
         number: Number of windows of each kind and severity, evenly spaced over the nominal ones; three durations alternate.
         severities: Severities.
-
-    Returns:
-        The windows by kind and severity.
     """
     chosen = nominal[np.linspace(0, len(nominal) - 1, min(number, len(nominal))).astype(int)]
     durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
@@ -319,23 +274,14 @@ def anomalous_windows(
     return found
 
 
-def pieces_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows) -> list[NoiseWindows]:
-    """Returns disjoint windows of each kind, as many of each, cut into pieces if there are few.
-
-    Args:
-        generated: Generated windows of noise, or `learnt` itself.
-        learnt: Windows from which the noise model was fitted.
-        judged: Windows that it has not seen.
-    """
-    groups = [generated.disjoint if generated is learnt else generated, learnt.disjoint, judged.disjoint]
-    number, window = min(map(len, groups)), generated.noise.shape[1]
-    if not number:
-        return [each.at(np.zeros(0, int)) for each in groups]
-    pieces = max(1, min(-(-_ENOUGH_PIECES // number), window // _LEAST_PIECE))
-    short = window // pieces
-    found = []
-    for each in groups:
-        some = each.at(np.linspace(0, len(each) - 1, number).astype(int))
+def pieces_of(*groups: NoiseWindows) -> list[NoiseWindows]:
+    """Returns disjoint windows of each group, as many of each, cut into pieces if there are few."""
+    disjoint, window = [each.disjoint for each in groups], groups[0].noise.shape[1]
+    number = min(map(len, disjoint))
+    pieces = max(1, min(-(-_ENOUGH_PIECES // max(number, 1)), window // _LEAST_PIECE))
+    short, found = window // pieces, []
+    for each in disjoint:
+        some = each.evenly(number)
         cut = (windows[:, : short * pieces].reshape(-1, short, *windows.shape[2:]) for windows in (some.noise, some.clean))
         found.append(NoiseWindows(*cut))
     return found

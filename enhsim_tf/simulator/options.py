@@ -21,14 +21,6 @@ def _option(
     return dataclasses.field(default=default, metadata={"help": help_text, "least": least, "most": most, "choices": choices, "kind": kind})
 
 
-class _Checked:
-    """A dataclass whose fields have limits and choices."""
-
-    def __post_init__(self):
-        for field in dataclasses.fields(self):
-            _check(field, getattr(self, field.name))
-
-
 def _check(field: dataclasses.Field, value: Any) -> None:
     limits = field.metadata
     if value is None and field.default is None:
@@ -46,7 +38,7 @@ def _check(field: dataclasses.Field, value: Any) -> None:
 
 
 @dataclasses.dataclass(frozen=True)
-class FitOptions(_Checked):
+class FitOptions:
     """Options of a fit. The defaults are those of the command `fit`.
 
     Args:
@@ -55,7 +47,7 @@ class FitOptions(_Checked):
         epochs: Passes of a network over the training windows.
         noise: Name of the noise model, or `best`.
         enhancer: Name of the enhancer, or `best`.
-        held_out: Share of the telemetry, taken from its end, on which the report is measured. 0 fits and reports on all telemetry.
+        held_out: Share of the telemetry, taken from its end, on which the report is measured. 0 fits and reports on all of it.
         delay_s: Delay of the telemetry relative to a recorded run, in seconds.
         seed: Random seed.
 
@@ -90,6 +82,10 @@ class FitOptions(_Checked):
     )
     seed: int = _option(0, "random seed (default: 0)", least=0, most=2**31 - 1)
 
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            _check(field, getattr(self, field.name))
+
 
 @dataclasses.dataclass(frozen=True)
 class ScoreOptions:
@@ -119,13 +115,7 @@ class ScoreOptions:
 
 
 def add_options(parser: argparse.ArgumentParser, options: type, *names: str) -> None:
-    """Adds fields of a class of options to a parser.
-
-    Args:
-        parser: The parser or a group of it.
-        options: The class.
-        *names: Names of the fields.
-    """
+    """Adds fields of a class of options, given by name, to a parser or a group of it."""
     fields = {field.name: field for field in dataclasses.fields(options)}
     for name in names:
         field = fields[name]
@@ -141,15 +131,7 @@ def add_options(parser: argparse.ArgumentParser, options: type, *names: str) -> 
 
 
 def options_from(namespace: argparse.Namespace, options: type) -> Any:
-    """Makes an object of a class of options from a parsed command line.
-
-    Args:
-        namespace: Parsed options.
-        options: The class.
-
-    Raises:
-        InputError: If a value is out of range.
-    """
+    """Makes an object of a class of options from a parsed command line; raises InputError if a value is out of range."""
     found = {}
     for field in dataclasses.fields(options):
         if hasattr(namespace, field.name):
@@ -160,9 +142,5 @@ def options_from(namespace: argparse.Namespace, options: type) -> Any:
 
 
 def default_window(num_samples: float) -> int:
-    """Returns the window length in samples for a record without a period that is known.
-
-    Args:
-        num_samples: Length of the record in samples.
-    """
+    """Returns the window length in samples for a record of so many samples without a period that is known."""
     return int(min(max(num_samples // _WINDOWS_IN_RECORD, LEAST_WINDOW), MOST_WINDOW))

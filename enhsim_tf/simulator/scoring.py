@@ -4,7 +4,9 @@ The threshold is the larger of two: that of generated telemetry, and that of the
 threshold, and never undercuts what real nominal time shows.
 """
 
+import dataclasses
 import functools
+import itertools
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,14 +15,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import JointSize
-from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
+from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import RESIDUAL, all_detectors
 from enhsim_tf.detection.residual_size import ResidualSize, root_mean_square
+from enhsim_tf.enhancer.model import run_starts
 from enhsim_tf.simulator.joint import cut, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
@@ -48,19 +51,11 @@ class Scorer:
     channels the distance of `JointSize`.
 
     Args:
-        simulator: The simulator.
+        simulator: The simulator, whose nominal telemetry bounds the threshold from below.
         options: Options of the scoring.
-        nominal: Nominal telemetry that bounds the threshold from below. None: that of the fit.
-        run: Its coarse run, for recorded runs. None: that of the fit.
     """
 
-    def __init__(
-        self,
-        simulator: EnhancedSimulator,
-        options: ScoreOptions | None = None,
-        nominal: Recording | None = None,
-        run: Recording | None = None,
-    ):
+    def __init__(self, simulator: EnhancedSimulator, options: ScoreOptions | None = None):
         self.simulator, self.options = simulator, options or ScoreOptions()
         self.window, self.stride = simulator.window, max(1, simulator.window // _STRIDES)
         self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", DEFAULT))).detector
@@ -68,61 +63,56 @@ class Scorer:
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
         seed = self.options.seed
-        training = self._generated_windows(self.options.num_windows, seed)
+        if simulator.is_run_model:
+            training = simulator.draw_noise(simulator.generate_clean(self.options.num_windows, seed=seed), np.random.default_rng([seed, 3]))
+        else:
+            training = simulator.generate(self.options.num_windows, seed=seed)
         self.detector = ResidualSize() if self.name == RESIDUAL else all_detectors()[self.name](seed)
         means = training.mean(axis=1, dtype=np.float64)
-        self._low, self._high = means.min(axis=0), means.max(axis=0)
-        width = np.maximum(self._high - self._low, simulator.noise_sd)
-        self._low, self._high = self._low - width, self._high + width  # levels beyond count as residual
+        width = np.maximum(np.ptp(means, axis=0), simulator.noise_sd)
+        self._low, self._high = means.min(axis=0) - width, means.max(axis=0) + width  # levels beyond count as residual
         if self.name == RESIDUAL:
             self._joint = None if len(simulator.channels) == 1 else JointSize().fit(self._judged(training))
             self.detector.fit_sizes(self._sizes(training))
         else:
             self.detector.fit(self._judged(training))
-        length = int(np.clip(_SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS))
-        scores = self._of_generated(length, seed + 1)
-        generated, self.rate = metrics.finite_threshold(scores, self.options.false_alarm_rate, length)
-        real = self._of_nominal(*((simulator.nominal, self._nominal_run()) if nominal is None else (nominal, run)))
-        self.nominal_threshold = (
-            metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0] if len(real) else -np.inf
-        )
+        generated, self.rate = metrics.finite_threshold(self._of_generated(seed + 1), self.options.false_alarm_rate, self._length)
+        real, self.nominal_threshold = self._of_nominal(), -np.inf
+        if len(real):
+            self.nominal_threshold = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0]
         self.threshold = max(generated, self.nominal_threshold)
-        self._length = length
+
+    @property
+    def _length(self) -> int:
+        """Length of the generated series in windows."""
+        return int(np.clip(_SERIES_VALUES // (self.window * len(self.simulator.channels)), 100, _THRESHOLD_WINDOWS))
 
     @functools.cached_property
     def nominal_scores(self) -> np.ndarray:
         """Scores of a further generated series, on which alarms are counted."""
-        with threadpool_limits(1):
-            return self._relative(self._of_generated(self._length, self.options.seed + 2))
+        return self._relative(self._of_generated(self.options.seed + 2))
 
-    def _nominal_run(self) -> Recording | None:
-        return self.simulator.alignment.nominal if self.simulator.is_run_model else None
-
-    def _generated_windows(self, number: int, seed: int) -> np.ndarray:
-        if not self.simulator.is_run_model:
-            return self.simulator.generate(number, seed=seed)
-        return self.simulator.draw_noise(self.simulator.generate_clean(number, seed=seed), np.random.default_rng([seed, 3]))
-
-    def _of_generated(self, length: int, seed: int) -> np.ndarray:
-        series = self.simulator.generate_series(length * self.window, seed=seed)
+    def _of_generated(self, seed: int) -> np.ndarray:
+        series = self.simulator.generate_series(self._length * self.window, seed=seed)
         if self.simulator.is_run_model:
-            series = series - self.simulator._nominal_series(len(series), 0.0)
+            series = series - self.simulator.nominal_series(len(series))
         return self._raw(series)
 
-    def _of_nominal(self, nominal: Recording | None, run: Recording | None) -> np.ndarray:
-        """Scores nominal telemetry, at most so many values of it, evenly spread."""
+    def _of_nominal(self) -> np.ndarray:
+        """Scores the nominal telemetry of the fit: of parts with too many values the middle."""
+        nominal, run = self.simulator.nominal, self.simulator.nominal_run
         if nominal is None:
             return np.zeros(0)
-        kept = [number for number, part in enumerate(nominal.parts) if len(part) >= self.window]
-        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, len(kept))))
-        found = [np.zeros(0)]
-        for number in kept:
-            first = (len(nominal.parts[number]) - most) // 2 if len(nominal.parts[number]) > most else 0
-            part = nominal.parts[number].values[first : first + most]
-            if run is not None:
-                part = part - self.simulator.enhance_run(run.parts[number].values[first : first + most])
-            found.append(self._raw(part))
-        return np.concatenate(found)
+        kept = sum(len(part) >= self.window for part in nominal.parts)
+        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, kept)))
+
+        def middle(recording: Recording) -> Recording:
+            firsts = [max(0, (len(part) - most) // 2) for part in recording.parts]
+            parts = [Run(part.values[first : first + most]) for part, first in zip(recording.parts, firsts, strict=True)]
+            return dataclasses.replace(recording, parts=tuple(parts))
+
+        series = self.simulator.judged_series(middle(nominal), None if run is None else middle(run))
+        return np.concatenate([np.zeros(0), *map(self._raw, series)])
 
     def _judged(self, windows: np.ndarray) -> np.ndarray:
         """What the detector sees of windows: one channel as it is, several in units of their standard deviations."""
@@ -131,8 +121,8 @@ class Scorer:
         return windows[:, :, 0] if windows.shape[2] == 1 else windows / self.unit
 
     def _raw(self, series: np.ndarray) -> np.ndarray:
-        """Scores each sample of a series of shape `(samples, channels)` by the mean score of the windows that contain it."""
-        begins = np.unique(np.append(np.arange(0, len(series) - self.window + 1, self.stride), len(series) - self.window))
+        """Scores each sample of a series of shape `(samples, channels)`, without dividing by the threshold."""
+        begins = run_starts(len(series), self.window, self.stride)
         step = max(1, _CHUNK_VALUES // (self.window * series.shape[1]))
         chunks = (begins[first : first + step] for first in range(0, len(begins), step))
         scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
@@ -150,11 +140,7 @@ class Scorer:
         return np.hypot(sizes, np.sqrt(np.mean(beyond**2, axis=1)))
 
     def score_windows(self, windows: np.ndarray) -> np.ndarray:
-        """Scores single windows, which are not in the order of time, without dividing by the threshold.
-
-        Args:
-            windows: Telemetry, or for recorded runs residuals, shape `(windows, samples, channels)`.
-        """
+        """Scores what `judged_series` returns in single windows of any order, without dividing by the threshold."""
         if self.name == RESIDUAL:
             return self._sizes(windows)
         return self.detector.score(self._judged(windows))
@@ -163,8 +149,7 @@ class Scorer:
         """Scores every sample.
 
         Args:
-            series: Telemetry without gaps, or for recorded runs telemetry minus the enhanced run, shape `(samples, channels)`, with at least a
-                window of samples.
+            series: A series of `EnhancedSimulator.judged_series`, shape `(samples, channels)`, with at least a window of samples.
 
         Returns:
             float64 array of shape `(samples,)`, scaled so that the threshold is 1.
@@ -172,16 +157,16 @@ class Scorer:
         return self._relative(self._raw(np.asarray(series, np.float32)))
 
     def _relative(self, scores: np.ndarray) -> np.ndarray:
-        # if the threshold is not positive, the scores are shifted instead
+        # with a threshold that is not positive, the scores are shifted instead
         return scores / self.threshold if self.threshold > 0 else 1 + scores - self.threshold
 
 
+@threadpool_limits.wrap(limits=1)  # several threads take longer for arrays of this size
 def score(
     simulator: EnhancedSimulator,
     telemetry: Recording,
     run: Recording | None = None,
     options: ScoreOptions | None = None,
-    scorer: Scorer | None = None,
 ) -> "pd.DataFrame":
     """Scores every sample of telemetry.
 
@@ -190,7 +175,6 @@ def score(
         telemetry: Telemetry of its channels, as returned by `joint.join_channels`.
         run: The coarse run of the same time, for a simulator of recorded runs.
         options: Options of the scoring. None uses the defaults.
-        scorer: A scorer of this simulator, if there is one already.
 
     Returns:
         A data frame with the index of `pandas_series.to_series` and the columns `value` (of several channels, their names), with a run
@@ -203,62 +187,45 @@ def score(
     Raises:
         InputError: If channels, interval or run do not fit to the simulator, or if every part is shorter than a window.
     """
-    check_fits(simulator, telemetry, run)
-    with threadpool_limits(1):  # several threads take longer for arrays of this size
-        return _scored(simulator, telemetry, run, scorer or Scorer(simulator, options))
-
-
-def _scored(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None, scorer: Scorer) -> "pd.DataFrame":
     import pandas as pd
 
     from enhsim_tf.simulator.trusted_range import TrustedRange
 
-    trusted = TrustedRange(simulator) if run is not None else None
-    coarse = _coarse_of(simulator, telemetry, run)
-    frames, judged = [], []
-    for number, part in enumerate(telemetry.parts):
-        single = len(simulator.channels) == 1
-        columns = {"value" if single else name: part.values[:, channel] for channel, name in enumerate(simulator.channels)}
-        scores, outside = np.full(len(part), np.nan), np.full(len(part), np.nan)
-        enhanced = np.full(part.values.shape, np.nan, np.float32)
-        for first, values in coarse[number]:
-            here = slice(first, first + len(values))
-            if run is None:
-                seen = part.values[here]
-            else:
-                enhanced[here] = simulator.enhance_run(values)
-                seen = part.values[here] - enhanced[here]
-                outside[here] = trusted.score_run(values)
-            scores[here] = scorer.score_series(seen)
-            judged.append((number, first, seen))
+    check_fits(simulator, telemetry, run)
+    scorer = Scorer(simulator, options)
+    trusted = None if run is None else TrustedRange(simulator)
+    values = np.concatenate([part.values for part in telemetry.parts])
+    scores, outside = np.full((2, len(values)), np.nan)
+    enhanced, judged = np.full(values.shape, np.nan, np.float32), []
+    for place, coarse in _stretches(simulator, telemetry, run):
+        here = slice(place, place + len(coarse))
+        seen = values[here]
         if run is not None:
-            columns |= {"enhanced" if single else f"enhanced {name}": enhanced[:, k] for k, name in enumerate(simulator.channels)}
-        columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
-        frames.append(pd.DataFrame(columns, index=to_series(telemetry_of(telemetry)[number]).index))
+            enhanced[here], outside[here] = simulator.enhance_run(coarse), trusted.score_run(coarse)
+            seen = seen - enhanced[here]
+        scores[here] = scorer.score_series(seen)
+        judged.append((place, seen))
     if not judged:
         raise InputError(
             f"Expected a part of at least one window of {simulator.window} samples. Received: {max(map(len, telemetry.parts))} samples. "
             "Give more telemetry."
         )
-    frame = pd.concat(frames)
-    departure = find_departure(scorer, telemetry, [frame["score"].to_numpy() for frame in frames], judged)
+    single = len(simulator.channels) == 1
+    columns = dict(zip(("value",) if single else simulator.channels, values.T, strict=True))
+    if run is not None:
+        names = ("enhanced",) if single else [f"enhanced {name}" for name in simulator.channels]
+        columns |= dict(zip(names, enhanced.T, strict=True))
+    columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
+    frame = pd.DataFrame(columns, index=pd.concat([to_series(part) for part in telemetry_of(telemetry)]).index)
+    departure = find_departure(simulator, scorer.score_series, scores, judged)
     if departure is not None:
         frame["score_after"] = departure.scores
-    _note(frame, scorer, [len(each) for each in frames], departure)
+    _note(frame, scorer, np.cumsum([0, *map(len, telemetry.parts)]), departure)
     return frame
 
 
 def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> None:
-    """Refuses telemetry or a run that do not fit to a simulator.
-
-    Args:
-        simulator: The fitted simulator.
-        telemetry: Telemetry of its channels.
-        run: The coarse run of the same time, or None.
-
-    Raises:
-        InputError: If channels or interval differ, if a run is missing, or if one is given that the simulator cannot use.
-    """
+    """Raises InputError if channels or interval differ, if a coarse run is missing, or if one is given that the simulator cannot use."""
     if telemetry.columns != simulator.channels and not len(telemetry.columns) == len(simulator.channels) == 1:
         raise InputError(
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
@@ -277,74 +244,62 @@ def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
         simulator.recorded_runs()
 
 
-def _coarse_of(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> list[list[tuple[int, np.ndarray]]]:
-    """For each part of the telemetry, the first sample and the coarse values of each stretch that can be scored."""
+def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> list[tuple[int, np.ndarray]]:
+    """The first sample and the coarse values of each stretch that can be scored; without a run, the telemetry itself."""
+    places = np.cumsum([0, *map(len, telemetry.parts)])
     if run is None:
-        return [[(0, part.values)] if len(part) >= simulator.window else [] for part in telemetry.parts]
-    _, coarse = simulator.alignment.pair(telemetry, run)
-    found: list[list[tuple[int, np.ndarray]]] = [[] for _ in telemetry.parts]
-    for stretch in coarse.parts:
-        for number, part in enumerate(telemetry.parts):
+        return [(place, part.values) for place, part in zip(places, telemetry.parts, strict=False) if len(part) >= simulator.window]
+    found, (_, coarse) = [], simulator.alignment.pair(telemetry, run)
+    for place, part in zip(places, telemetry.parts, strict=False):
+        for stretch in coarse.parts:
             first = round((stretch.offset_s - part.offset_s) / telemetry.interval_s)
             if 0 <= first < len(part):
-                found[number].append((first, stretch.values))
+                found.append((place + first, stretch.values))
     return found
 
 
-def _note(frame: "pd.DataFrame", scorer: Scorer, lengths: Sequence[int], departure: Departure | None) -> None:
+def _note(frame: "pd.DataFrame", scorer: Scorer, edges: Sequence[int], departure: Departure | None) -> None:
     """Notes detector, expected false alarms and events in `frame.attrs`, see `score`."""
-    window, interval_s, scores = scorer.window, scorer.simulator.interval_s, frame["score"].to_numpy()
-    events, before = [], 0
-    for length in lengths:
-        own = scores[before : before + length].copy()
-        if departure is not None and departure.begin < before + length:
-            own[max(departure.begin - before, 0) :] = np.nan  # a lasting departure is one event
-        events += event_rows(own, before, scorer.nominal_scores, window, interval_s)
-        before += length
-    if departure is not None:
-        peak = departure.begin + int(np.nanargmax(scores[departure.begin :]))
-        end, flagged = len(scores), int(np.nansum(scores[departure.begin :] > 1))
-        row = {"begin": departure.begin, "end": end, "peak": peak, "duration_s": (end - departure.begin) * interval_s}
-        events.append(row | {"num_flagged": flagged, "score": float(scores[peak]), "confidence": event_confidence(scores[peak], scorer)})
-    num_alarms = len(events_of(scorer.nominal_scores > 1, gap=window))
+    nominal, interval_s, since = scorer.nominal_scores, scorer.simulator.interval_s, departure and departure.begin
+    num_alarms = len(events_of(nominal > 1, gap=scorer.window))
     frame.attrs["detector"] = scorer.name
     frame.attrs["expected_false_alarm_rate"] = scorer.rate
-    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(scorer.nominal_scores) * interval_s))
-    frame.attrs["events"] = events
-    frame.attrs["departure"] = "" if departure is None else departure.said
-
-
-def event_confidence(peak: float, scorer: Scorer) -> float:
-    """Confidence that an event with this highest score is no false alarm, see `events.confidences`."""
-    return float(confidences([peak], scorer.nominal_scores, scorer.window)[0])
-
-
-def event_rows(scores: np.ndarray, before: int, nominal_scores: np.ndarray, window: int, interval_s: float) -> list[dict]:
-    """Returns the events of a part in plain JSON types. Flags within a window of each other are one event, as they share windows.
-
-    Args:
-        scores: Scores of the part, scaled so that the threshold is 1, shape `(samples,)`.
-        before: Number of samples before the part.
-        nominal_scores: Scores of a generated nominal series, shape `(samples,)`.
-        window: Length of a window in samples.
-        interval_s: Sampling interval in seconds.
-    """
-    flags, rows = scores > 1, []
-    found = events_of(flags, scores, window)
-    peaks = [scores[event.peak] for event in found]
-    for event, peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True):
-        rows.append(
-            {
-                "begin": before + event.begin,
-                "end": before + event.end,
-                "peak": before + event.peak,
-                "duration_s": (event.end - event.begin) * interval_s,
-                "num_flagged": int(flags[event.begin : event.end].sum()),
-                "score": float(peak),
-                "confidence": float(confidence),
-            }
+    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(nominal) * interval_s))
+    frame.attrs["events"] = event_rows(frame["score"].to_numpy(), edges, nominal, scorer.window, interval_s, since)
+    frame.attrs["departure"] = ""
+    if departure is not None:
+        frame.attrs["departure"] = (
+            f"since {frame.index[since]} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a "
+            "lasting fault, or the new normal: then go on with `update`. score_after are scores against the new operating point."
         )
-    return rows
+
+
+def event_rows(
+    scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: int | None = None
+) -> list[dict]:
+    """Returns the events in plain JSON types. Flags of a part within a window of each other are one event, as they share windows.
+
+    `edges` are the first samples of the parts and the number of samples; from the first sample of a departure on, all is one event.
+    """
+    found, before = [], len(scores) if departure is None else departure
+    for first, end in itertools.pairwise(edges):
+        own = np.where(np.arange(first, end) < before, scores[first:end], np.nan)
+        found += [Event(*(int(first) + place for place in event)) for event in events_of(own > 1, own, window)]
+    if departure is not None:
+        found.append(Event(departure, len(scores), departure + int(np.nanargmax(scores[departure:]))))
+    peaks = [float(scores[event.peak]) for event in found]
+    return [
+        {
+            "begin": event.begin,
+            "end": event.end,
+            "peak": event.peak,
+            "duration_s": (event.end - event.begin) * interval_s,
+            "num_flagged": int((scores[event.begin : event.end] > 1).sum()),
+            "score": peak,
+            "confidence": float(confidence),
+        }
+        for event, peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True)
+    ]
 
 
 def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
@@ -376,12 +331,7 @@ def events_path(path: str | os.PathLike) -> Path:
 
 
 def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
-    """Writes scores to a `.parquet` or `.csv` file, and their events to `events_path`. The files appear only when both are complete.
-
-    Args:
-        path: Path of the file.
-        frame: Scores, as returned by `score`.
-    """
+    """Writes what `score` returns to a `.parquet` or `.csv` file, and the events to `events_path`. Both files appear when they are complete."""
     with replace_file(path) as temporary, replace_file(events_path(path)) as events:
         events_table(frame).to_csv(events, index=False)
         if Path(path).suffix == ".csv":

@@ -6,6 +6,7 @@ It knows nothing of how it is fitted; see `fitting.fit`.
 import dataclasses
 import functools
 import itertools
+import operator
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -14,20 +15,19 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
-from enhsim_tf.coarse_simulator.recording import Recording, Run, record
+from enhsim_tf.coarse_simulator.recording import Recording, record
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.noise.candidates import NoiseModel, model_from, state_of
-from enhsim_tf.simulator.alignment import Alignment, Drawn, Runs, Waves
-from enhsim_tf.simulator.changes import add_changed, blend_changes, fade_length, hold_values, spans, tolerance_of
-from enhsim_tf.simulator.checks import check_counts, check_finite
-from enhsim_tf.simulator.joint import cut
-from enhsim_tf.simulator.saving import read_saved, write_saved
+from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs, Waves, arrays_of_recording, recording_of
+from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
+from enhsim_tf.simulator.joint import cut, rounded
+from enhsim_tf.simulator.model_folder import read_saved, write_saved
 from enhsim_tf.telemetry.quantisation import Levels
+from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 _CHUNK_VALUES = 2_000_000  # values that are generated at a time
 _NUM_NOISE = 256  # windows of generated noise from which its standard deviation is computed
-_START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 
 
 class EnhancedSimulator:
@@ -83,6 +83,11 @@ class EnhancedSimulator:
         """Whether the coarse simulator is recorded runs on the clock of the telemetry."""
         return isinstance(self.alignment, Runs)
 
+    @property
+    def nominal_run(self) -> Recording | None:
+        """The coarse run of the nominal telemetry; None for square waves."""
+        return self.alignment.nominal if self.is_run_model else None
+
     @functools.cached_property
     def noise_sd(self) -> np.ndarray:
         """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
@@ -104,7 +109,7 @@ class EnhancedSimulator:
         Args:
             coarse: Coarse windows of shape `(windows, samples, columns)`.
             shift: Offset of each window and channel, shape `(windows, channels)`, or None.
-            gain: Factor of each window and channel, same shape, or None.
+            gain: Factor likewise.
 
         Returns:
             float32 array of shape `(windows, samples, channels)`, in the telemetry's unit.
@@ -139,15 +144,9 @@ class EnhancedSimulator:
         return average_windows(lambda rows: self.enhance(cut([coarse], starts[rows], self.window)), starts, self.window, len(coarse))
 
     def residuals(self, targets: np.ndarray) -> np.ndarray:
-        """Returns telemetry windows minus the square waves that are aligned with them, enhanced.
+        """Returns telemetry windows of shape `(windows, samples, channels)` minus the square waves that are aligned with them, enhanced.
 
         The gain may leave the range of the training by at most a factor of 2, so that a channel that stands still is not explained.
-
-        Args:
-            targets: Telemetry, shape `(windows, samples, channels)`.
-
-        Returns:
-            float32 array of the same shape.
         """
         coarse, _, gain = self.alignment.align(targets)
         enhanced = self.enhance(coarse)
@@ -155,27 +154,36 @@ class EnhancedSimulator:
         left = targets - bounded * enhanced
         return (left - left.mean(axis=1, keepdims=True)).astype(np.float32)
 
+    def windows_and_signal(self, telemetry: Recording, run: Recording | None, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns so many evenly spaced windows of telemetry, shape `(windows, samples, channels)`, and the enhanced signal of the same times.
+
+        For recorded runs, `run` is the coarse run with the same parts.
+        """
+        series = [part.values for part in telemetry.parts]
+        starts = evenly_spaced_starts(series, self.window, number)
+        windows = cut(series, starts, self.window)
+        if run is None:
+            return windows, self.enhance(*self.alignment.align(windows))
+        return windows, cut([self.enhance_run(part.values) for part in run.parts], starts, self.window)
+
+    def judged_series(self, telemetry: Recording, run: Recording | None) -> list[np.ndarray]:
+        """Returns what detectors judge: the parts of the telemetry that have a window, without the enhanced run of the same parts, if given."""
+        long = [number for number, part in enumerate(telemetry.parts) if len(part) >= self.window]
+        series = [telemetry.parts[number].values for number in long]
+        if run is None:
+            return series
+        return [each - self.enhance_run(run.parts[number].values) for number, each in zip(long, series, strict=True)]
+
     # noise
 
     def draw_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Generates noise for windows of shape `(windows, samples, channels)`, or for one series of shape `(samples, channels)`.
-
-        Args:
-            clean: The enhanced signal.
-            rng: Random number generator.
-        """
+        """Generates noise for an enhanced signal: windows of shape `(windows, samples, channels)`, or one series `(samples, channels)`."""
         draw = self.noise.generate if np.ndim(clean) == 3 else self.noise.generate_series
         return check_finite(draw(len(clean), rng, clean))
 
     def add_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Adds noise to an enhanced signal and rounds quantised channels to their levels."""
-        return self._rounded(clean + self.draw_noise(clean, rng))
-
-    def _rounded(self, values: np.ndarray) -> np.ndarray:
-        for channel, levels in enumerate(self.quantisation):
-            if levels is not None:
-                values[..., channel] = levels.round(values[..., channel])
-        return values
+        return rounded(clean + self.draw_noise(clean, rng), self.quantisation)
 
     # windows
 
@@ -193,38 +201,27 @@ class EnhancedSimulator:
         Raises:
             InputError: If `num_windows` is negative or not a whole number.
         """
-        return self._join(num_windows, self.generate_chunks(num_windows, scenario, seed))
+        return self._joined(num_windows, self.generate_labelled_chunks(num_windows, scenario, seed))
 
     def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Returns the windows of `generate` before noise is added."""
-        return self._join(num_windows, (windows for windows, _ in self._chunks(num_windows, scenario, seed, None)))
-
-    def generate_chunks(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> Iterator[np.ndarray]:
-        """Yields the windows of `generate` in chunks, so that memory does not grow with their number."""
-        return (windows for windows, _ in self.generate_labelled_chunks(num_windows, scenario, seed))
+        return self._joined(num_windows, self._chunks(num_windows, scenario, seed, None))
 
     def generate_labelled_chunks(
         self, num_windows: int, scenario: Degraded | None = None, seed: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yields the chunks of `generate_chunks`, each with a mask of the samples that the scenario has changed.
+        """Yields the windows of `generate` in chunks, each with a mask of the samples that the scenario has changed.
 
-        Args:
-            num_windows: Number of windows.
-            scenario: A degraded mode, or None for nominal telemetry.
-            seed: Random seed.
-
-        Yields:
-            float32 windows and boolean masks, both of shape `(chunk, samples, channels)`. A sample that is not marked equals that of the
-            same seed without a scenario.
+        Memory does not grow with the number of windows. A sample that is not marked equals that of the same seed without a scenario.
         """
         return self._chunks(num_windows, scenario, seed, np.random.default_rng([seed, 1]))
 
     def _chunks(
         self, num_windows: int, scenario: Degraded | None, seed: int, noise_rng: np.random.Generator | None
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        check_counts(num_windows=(num_windows, 0))
+        _check_count("num_windows", num_windows, 0)
         rng = np.random.default_rng(seed)
-        starts = rng.integers(0, _START_RANGE, num_windows)
+        starts = rng.integers(0, START_RANGE, num_windows)
         rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
         chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
         for first in range(0, num_windows, chunk):
@@ -232,89 +229,61 @@ class EnhancedSimulator:
             drawn = self.alignment.draw(starts[some], [scenario] * len(starts[some]), rng)
             yield self.complete(drawn, None if self.levels is None else self.levels[rows[some]], noise_rng)
 
-    def _join(self, num_windows: int, chunks: Iterator[np.ndarray]) -> np.ndarray:
-        check_counts(num_windows=(num_windows, 0))
+    def _joined(self, num_windows: int, chunks: Iterator[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+        _check_count("num_windows", num_windows, 0)
         windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
-        for chunk in chunks:
+        for chunk, _ in chunks:
             windows[filled : filled + len(chunk)] = chunk
             filled += len(chunk)
         return windows
 
     def complete(self, drawn: Drawn, levels: np.ndarray | None, noise_rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
-        """Completes coarse windows to telemetry, and marks the samples that a degraded mode has changed.
+        """Completes coarse windows to telemetry; returns float32 windows, and a mask of the samples that a degraded mode has changed.
 
-        Args:
-            drawn: Coarse windows, nominal and degraded.
-            levels: Offset and gain of each window and channel, shape `(windows, channels, 2)`, or None.
-            noise_rng: Random generator of the noise, or None for windows without noise.
-
-        Returns:
-            `(windows, mask)`, float32 and boolean of shape `(windows, samples, channels)`. Noise that follows the signal follows the nominal
-            one, so all samples that are not marked equal the nominal ones to the bit.
+        `levels` are offset and gain of each window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the
+        nominal signal, so samples that are not marked equal the nominal ones to the bit.
         """
         shift, gain = (None, None) if levels is None else (levels[..., 0], levels[..., 1])
         clean = self.enhance(drawn.nominal, shift, gain)
-        changed = drawn.coarse is not drawn.nominal and not np.array_equal(drawn.coarse, drawn.nominal)
         windows, mask = clean, np.zeros(clean.shape, bool)
-        if changed or drawn.held:
-            degraded = self.enhance(drawn.coarse, shift, gain) if changed else clean
-            windows, mask = self._changed(clean, degraded, drawn, fade_length(self.window))
-        if noise_rng is None:
-            return check_finite(windows), mask
-        return self._with_noise(windows, clean, mask, self.draw_noise(clean, noise_rng))
+        if drawn.coarse is not drawn.nominal:
+            degraded = self.enhance(drawn.coarse, shift, gain)
+            windows, mask = put_changes(clean, degraded, drawn, [(0, self.window)], fade_length(self.window), self._tolerance)
+        return (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
 
-    def _changed(self, clean: np.ndarray, degraded: np.ndarray, drawn: Drawn, fade: int) -> tuple[np.ndarray, np.ndarray]:
-        """Puts the changes of degraded windows into nominal ones; a coarse column may change every channel."""
-        windows, mask = clean.copy(), np.zeros(clean.shape, bool)
-        differs = drawn.coarse != drawn.nominal
-        for row, channel, begin, end in drawn.held:
-            if differs.shape[2] == clean.shape[2]:
-                differs[row, begin:end, channel] = False
-        for channel in range(clean.shape[2]):
-            inside = differs[:, :, channel] if differs.shape[2] == clean.shape[2] else differs.any(axis=2)
-            held = [(row, begin, end) for row, concerned, begin, end in drawn.held if concerned == channel]
-            if not (inside.any() or held):
-                continue
-            tolerance = tolerance_of(float(self.noise_sd[channel]), float(self.scale[channel]))
-            if inside.any():
-                found = blend_changes(clean[:, :, channel], degraded[:, :, channel], spans(inside), fade, tolerance)
-                windows[:, :, channel], mask[:, :, channel] = found
-            hold_values(windows[:, :, channel], mask[:, :, channel], held, tolerance)
-        return windows, mask
+    @property
+    def _tolerance(self) -> np.ndarray:
+        """Largest difference from the nominal run of each channel that does not count as a change."""
+        return np.maximum(TOLERANCE * self.noise_sd, LEAST_TOLERANCE * self.scale)
 
-    def _with_noise(self, windows: np.ndarray, clean: np.ndarray, mask: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if not mask.any():
-            windows += noise
-            return self._rounded(windows), mask
-        values = np.empty_like(windows)
-        for channel, levels in enumerate(self.quantisation):
-            of = (..., channel)
-            values[of], mask[of] = add_changed(windows[of], clean[of], noise[of], mask[of], levels)
+    def _with_noise(
+        self, windows: np.ndarray, clean: np.ndarray, mask: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Adds noise that follows the nominal signal; where rounding removes a change, it is not marked."""
+        noise = self.draw_noise(clean, rng)
+        values = rounded(check_finite(windows + noise), self.quantisation)
+        if mask.any():
+            is_quantised = [levels is not None for levels in self.quantisation]
+            mask[..., is_quantised] &= (values != rounded(clean + noise, self.quantisation))[..., is_quantised]
         return values, mask
 
     # series
 
-    def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
+    def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Generates one continuous series of any length, without visible joins between windows.
 
         Args:
             num_samples: Length of the series in samples.
             scenario: A degraded mode over the whole series, or None for nominal telemetry.
             seed: Random seed of the scenario and the noise.
-            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
 
         Returns:
             float32 array of shape `(num_samples, channels)`.
         """
-        return self.generate_labelled_series(num_samples, scenario, seed, start_s)[0]
+        return self.generate_labelled_series(num_samples, scenario, seed)[0]
 
     def generate_labelled_series(
-        self,
-        num_samples: int,
-        scenario: Degraded | None = None,
-        seed: int = 0,
-        start_s: float = 0.0,
-        schedule: Sequence[ScheduledMode] = (),
+        self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, schedule: Sequence[ScheduledMode] = ()
     ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
         """Generates the series of `generate_series`, with a mask of the samples that a degraded mode has changed.
 
@@ -322,63 +291,37 @@ class EnhancedSimulator:
             num_samples: Length of the series in samples.
             scenario: A degraded mode over the whole series, or None.
             seed: Random seed of the scenario and the noise.
-            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
             schedule: Degraded modes at given places, instead of a scenario.
 
         Returns:
-            `(values, mask, events)`: the float32 series, a boolean array that marks the samples that differ from the nominal series of the
-            same seed, both of shape `(samples, channels)`, and for each event that changed a sample its mode, its severity, its first
-            changed sample, and the first sample after its last changed one.
+            The float32 series, and a boolean array that marks the samples that differ from the nominal series of the same seed, both of shape
+            `(samples, channels)`; and for each event that changed a sample its mode, its severity, its first changed sample, and the first
+            sample after its last changed one.
 
         Raises:
             InputError: If events overlap or lie outside the series, or if both a scenario and a schedule are given.
         """
-        check_counts(num_samples=(num_samples, 1))
+        _check_count("num_samples", num_samples, 1)
         if scenario is not None and schedule:
             raise InputError("Expected a scenario or a schedule. Received: both. Put the scenario into the schedule.")
         schedule, noise_rng = check_schedule(schedule, num_samples), np.random.default_rng([seed, 1])
         if self.is_run_model:
             self.alignment.draw(np.zeros(0, int), [scenario, *schedule], noise_rng)  # refuses them
-            clean = self._nominal_series(num_samples, start_s)
+            clean = self.nominal_series(num_samples)
             return self.add_noise(clean, noise_rng), np.zeros(clean.shape, bool), []
+        events = [(Degraded(each.mode, each.severity, 0.0), each.begin, each.end) for each in schedule]
+        events += [] if scenario is None else [(scenario, 0, num_samples)]
         window, hop = self.window, self.window // 2
         num_windows = 1 + max(0, -(-(num_samples - window) // hop))  # that overlap by half and cover the series
-        length = window + (num_windows - 1) * hop
-        drawn = self.alignment.draw_series(length, start_s, scenario, schedule, num_samples, np.random.default_rng(seed))
+        drawn = self.alignment.draw_series(window + (num_windows - 1) * hop, events, np.random.default_rng(seed))
         levels = self._following_levels(num_windows, seed)
-        clean = self._join_series(drawn.nominal[0], levels)[None, :num_samples]
-        windows, mask = clean, np.zeros(clean.shape, bool)
-        if scenario is not None or schedule:
-            degraded = self._join_series(drawn.coarse[0], levels)[None, :num_samples]
-            inside = Drawn(drawn.coarse[:, :num_samples].copy(), drawn.nominal[:, :num_samples], drawn.held)
-            windows, mask = self._changed_events(clean, degraded, inside, schedule, num_samples)
-        values, mask = self._with_noise(windows[0].copy(), clean[0], mask[0], self.draw_noise(clean[0], noise_rng))
-        return values, mask, self._events(mask.any(axis=1), scenario, schedule)
-
-    def _changed_events(
-        self, clean: np.ndarray, degraded: np.ndarray, drawn: Drawn, schedule: Sequence[ScheduledMode], num_samples: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Puts the changes of each event into the nominal series."""
-        windows, mask = clean.copy(), np.zeros(clean.shape, bool)
-        for begin, end in [(event.begin, event.end) for event in schedule] or [(0, num_samples)]:
-            coarse = drawn.nominal.copy()
-            coarse[:, begin:end] = drawn.coarse[:, begin:end]
-            held = [each for each in drawn.held if begin <= each[2] < end]
-            found, marked = self._changed(clean, degraded, Drawn(coarse, drawn.nominal, held), fade_length(self.window))
-            windows, mask = np.where(marked, found, windows), mask | marked
-        return windows, mask
-
-    @staticmethod
-    def _events(changed: np.ndarray, scenario: Degraded | None, schedule: Sequence[ScheduledMode]) -> list[tuple[str, float, int, int]]:
-        ranges = [(event.mode, event.severity, event.begin, event.end) for event in schedule]
-        if scenario is not None:
-            ranges = [(scenario.mode, scenario.severity, 0, len(changed))]
-        edges = [0, *((before[3] + after[2]) // 2 for before, after in itertools.pairwise(ranges)), len(changed)]
-        events = []
-        for (mode, severity, *_), (begin, end) in zip(ranges, itertools.pairwise(edges), strict=bool(ranges)):
-            places = np.flatnonzero(changed[begin:end])
-            events += [(mode, severity, begin + int(places[0]), begin + int(places[-1]) + 1)] if len(places) else []
-        return events
+        series = clean = self._join_series(drawn.nominal[0], levels)[:num_samples]
+        mask = np.zeros(clean.shape, bool)
+        if events:
+            degraded, ranges = self._join_series(drawn.coarse[0], levels)[:num_samples], [event[1:] for event in events]
+            (series,), (mask,) = put_changes(clean[None], degraded[None], drawn, ranges, fade_length(window), self._tolerance)
+        values, mask = self._with_noise(series, clean, mask, noise_rng)
+        return values, mask, _changed_events(mask.any(axis=1), events)
 
     def _join_series(self, coarse: np.ndarray, levels: np.ndarray) -> np.ndarray:
         """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
@@ -401,20 +344,17 @@ class EnhancedSimulator:
         """The parts of the nominal run, enhanced."""
         return [self.enhance_run(part.values) for part in self.recorded_runs().usable(self.alignment.nominal).parts]
 
-    def _nominal_series(self, num_samples: int, start_s: float) -> np.ndarray:
+    def nominal_series(self, num_samples: int) -> np.ndarray:
         """Returns the enhanced nominal run, repeated if the series is longer; parts and repetitions are cross-faded."""
-        skipped, fade = round(start_s / self.interval_s), self.window // 2
-        clean = self._nominal_clean
+        fade, clean = self.window // 2, self._nominal_clean
         rise = (np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade) ** 2)[:, None]
-        pieces, tail = [clean[0][:-fade]], clean[0][-fade:]
-        length, number = len(pieces[0]), 0
-        while length < skipped + num_samples:
-            number += 1
-            following = clean[number % len(clean)].copy()
+        pieces, tail, length = [clean[0][:-fade]], clean[0][-fade:], len(clean[0]) - fade
+        while length < num_samples:
+            following = clean[len(pieces) % len(clean)].copy()
             following[:fade] = (1 - rise) * tail + rise * following[:fade]
             pieces.append(following[:-fade])
             length, tail = length + len(following) - fade, following[-fade:]
-        return np.concatenate(pieces)[skipped : skipped + num_samples].astype(np.float32)
+        return np.concatenate(pieces)[:num_samples].astype(np.float32)
 
     # runs of the user's simulator
 
@@ -428,11 +368,8 @@ class EnhancedSimulator:
 
         Yields:
             For each copy, one float32 array of shape `(samples, channels)` for each part of `alignment.usable(run)`.
-
-        Raises:
-            InputError: If the run cannot be enhanced.
         """
-        check_counts(num_copies=(num_copies, 0))
+        _check_count("num_copies", num_copies, 0)
         clean = [self.enhance_run(part.values) for part in self.recorded_runs().usable(run).parts]
         for number in range(num_copies):
             rng = np.random.default_rng([seed, 1, number])
@@ -459,11 +396,7 @@ class EnhancedSimulator:
         return record(runs.coarse, time_s, scenario, np.random.default_rng(seed), labels=labels)
 
     def recorded_runs(self) -> Runs:
-        """Returns the alignment of a simulator of recorded runs.
-
-        Raises:
-            InputError: If it is one of square waves.
-        """
+        """Returns the alignment of a simulator of recorded runs; raises InputError if it is one of square waves."""
         if not isinstance(self.alignment, Runs):
             raise InputError(
                 "Expected a model of recorded runs. Received: one of square waves, which needs no run. Leave --coarse out, or fit with it."
@@ -475,17 +408,13 @@ class EnhancedSimulator:
     def save(self, folder: str | os.PathLike) -> None:
         """Saves the simulator to a folder: `arrays.npz`, `settings.json`, and `manifest.json` with their checksums.
 
-        Args:
-            folder: The folder. A simulator that was saved there before is replaced.
+        A simulator that was saved there before is replaced.
 
         Raises:
-            InputError: If the folder contains something other than a saved simulator, or if a number is not finite; the folder is left
-                unchanged.
+            InputError: If the folder contains something else, or if a number is not finite; the folder is left unchanged.
         """
-        (noise, noise_arrays), nominal = state_of(self.noise), self.nominal
+        noise, noise_arrays = state_of(self.noise)
         arrays = {"enhancer": self.enhancer.arrays, "noise": noise_arrays, "alignment": self.alignment.arrays}
-        arrays |= {} if self.levels is None else {"levels": {"rows": self.levels}}
-        arrays |= {} if nominal is None else {"nominal": {f"part_{number}": part.values for number, part in enumerate(nominal.parts)}}
         settings = {
             "alignment": self.alignment.settings,
             "enhancer": self.enhancer.settings,
@@ -495,9 +424,13 @@ class EnhancedSimulator:
             "interval_s": self.interval_s,
             "level_step": self.level_step,
             "quantisation": [None if each is None else dataclasses.asdict(each) for each in self.quantisation],
-            "nominal": None if nominal is None else {"start": nominal.start, "offsets_s": [part.offset_s for part in nominal.parts]},
+            "nominal": None,
             "trained": self.trained,
         }
+        if self.levels is not None:
+            arrays["levels"] = {"rows": self.levels}
+        if self.nominal is not None:
+            arrays["nominal"], settings["nominal"] = arrays_of_recording(self.nominal)
         write_saved(folder, arrays, settings)
 
     @classmethod
@@ -525,33 +458,53 @@ class EnhancedSimulator:
     @classmethod
     def _from_saved(cls, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> "EnhancedSimulator":
         channels, interval_s, window = tuple(map(str, settings["channels"])), float(settings["interval_s"]), settings["window"]
+        level_step = float(settings["level_step"])
         enhancer = Enhancer.from_arrays(settings["enhancer"], arrays["enhancer"])
         kind = {"waves": Waves, "runs": Runs}[settings["alignment"]["kind"]]
         alignment = kind.from_arrays(settings["alignment"], arrays.get("alignment", {}), channels, interval_s, window)
         if enhancer.window != window or enhancer.channels != len(channels) or enhancer.columns != len(alignment.columns):
             raise ValueError("an enhancer that does not fit to the settings")
-        if not (np.isfinite(interval_s) and interval_s > 0):
-            raise ValueError("a sampling interval that is not above 0")
+        if not all(np.isfinite(each) and each > 0 for each in (interval_s, level_step)):
+            raise ValueError("an interval that is not above 0")
         levels, nominal = arrays.get("levels", {}).get("rows"), settings["nominal"]
         if (levels is None) != (kind is Runs) or (levels is not None and not (np.isfinite(levels).all() and levels.size)):
             raise ValueError("levels that do not fit to the alignment")
         quantisation = [None if each is None else Levels(**each) for each in settings["quantisation"]]
-        steps = [number for each in quantisation if each is not None for number in (each.step, each.origin)]
-        if (
-            len(quantisation) != len(channels)
-            or not np.isfinite(steps).all()
-            or any(each is not None and each.step <= 0 for each in quantisation)
-        ):
+        known = [each for each in quantisation if each is not None]
+        if len(quantisation) != len(channels) or not all(np.isfinite([each.step, each.origin]).all() and each.step > 0 for each in known):
             raise ValueError("quantisation of other channels, or without levels")
         if nominal is not None:
-            runs = [Run(arrays["nominal"][f"part_{number}"], float(offset)) for number, offset in enumerate(nominal["offsets_s"])]
-            nominal = Recording(tuple(runs), channels, interval_s, nominal["start"], ", ".join(channels))
-            if not all(np.isfinite(run.values).all() for run in runs):
-                raise ValueError("nominal telemetry that is not finite")
+            nominal = recording_of(arrays["nominal"], nominal, channels, interval_s, ", ".join(channels))
         noise, shape = model_from(settings["noise"], arrays["noise"]), (1, window, len(channels))
         if noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
             raise ValueError("noise of another shape")
-        step = float(settings["level_step"])
-        if not (np.isfinite(step) and step > 0):
-            raise ValueError("levels without a step")
-        return cls(alignment, enhancer, noise, channels, interval_s, levels, quantisation, nominal, settings["trained"], step)
+        return cls(alignment, enhancer, noise, channels, interval_s, levels, quantisation, nominal, settings["trained"], level_step)
+
+
+def _changed_events(changed: np.ndarray, events: Sequence[tuple[Degraded, int, int]]) -> list[tuple[str, float, int, int]]:
+    """Mode, severity, first changed sample and end of the events that changed a sample; what lies between two belongs to the nearer."""
+    edges = [0, *((before[2] + after[1]) // 2 for before, after in itertools.pairwise(events)), len(changed)]
+    found = []
+    for (scenario, *_), begin, end in zip(events, edges[:-1], edges[1:], strict=False):
+        places = np.flatnonzero(changed[begin:end])
+        found += [(scenario.mode, scenario.severity, begin + int(places[0]), begin + int(places[-1]) + 1)] if len(places) else []
+    return found
+
+
+def _check_count(name: str, count: Any, least: int) -> None:
+    try:
+        is_large_enough = operator.index(count) >= least
+    except TypeError:
+        is_large_enough = False
+    if not is_large_enough:
+        raise InputError(f"Expected {name} to be a whole number, at least {least}. Received: {name}={count!r}.")
+
+
+def check_finite(windows: np.ndarray) -> np.ndarray:
+    """Returns generated telemetry; raises InputError if a value is not finite."""
+    bad = np.size(windows) - np.count_nonzero(np.isfinite(windows))
+    if bad:
+        raise InputError(
+            f"Expected a simulator that generates finite values. Received: {bad:,} of {np.size(windows):,} values that are not. Fit it again."
+        )
+    return windows

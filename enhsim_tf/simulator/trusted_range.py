@@ -7,15 +7,16 @@ import numpy as np
 from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.model import average_windows, run_starts
 from enhsim_tf.enhancer.out_of_range import OutOfRange
-from enhsim_tf.simulator.joint import cut
+from enhsim_tf.simulator.alignment import START_RANGE
+from enhsim_tf.simulator.joint import cut, spread_of
 
 if TYPE_CHECKING:
     from enhsim_tf.coarse_simulator.degraded import Degraded
     from enhsim_tf.simulator.simulator import EnhancedSimulator
 
+_RATE = 0.01  # share of nominal windows that count as outside the range
 _NUM_NOMINAL = 900  # coarse windows for fitting the range, and as many others for its limit
 _LEAST_LIMIT = 1e-3  # lower bound of the limit, for periodic coarse windows whose scores are all close to 0
-_START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 
 
 class TrustedRange:
@@ -25,36 +26,29 @@ class TrustedRange:
 
     Args:
         simulator: A simulator fitted to nominal telemetry.
-        rate: Share of nominal windows that count as outside the range.
 
     Example:
     >>> trusted = TrustedRange(simulator)
     >>> trusted.share_outside(Degraded("stuck", severity=0.5))
     """
 
-    def __init__(self, simulator: "EnhancedSimulator", rate: float = 0.01):
+    def __init__(self, simulator: "EnhancedSimulator"):
         self.simulator = simulator
         learnt, held_out = (self._drawn(None, _NUM_NOMINAL, seed) for seed in range(2))
-        spread = np.std(learnt, axis=(0, 1), dtype=np.float64)
-        self._centre, self._scale = learnt.mean(axis=(0, 1), dtype=np.float64), np.where(spread > 0, spread, 1.0)
+        self._centre, self._scale = learnt.mean(axis=(0, 1), dtype=np.float64), spread_of(learnt)
         self._range, self._limit = None, _LEAST_LIMIT
-        if not np.ptp(learnt, axis=0).any():  # constant levels: whatever differs from them is outside
-            return
-        self._range = OutOfRange().fit(self._rows(learnt))
-        limit, _ = metrics.finite_threshold(self._range.score(self._rows(held_out)), rate)
-        self._limit = max(limit, _LEAST_LIMIT)
+        if np.ptp(learnt, axis=0).any():  # whatever differs from constant levels is outside
+            self._range = OutOfRange().fit(self._rows(learnt))
+            limit, _ = metrics.finite_threshold(self._range.score(self._rows(held_out)), _RATE)
+            self._limit = max(limit, _LEAST_LIMIT)
 
     def _rows(self, windows: np.ndarray) -> np.ndarray:
         return ((windows - self._centre) / self._scale).reshape(len(windows), -1).astype(np.float32)
 
     def score(self, coarse: np.ndarray) -> np.ndarray:
-        """Scores how far coarse windows are outside the training range. A share `rate` of nominal windows scores above 1.
+        """Scores how far coarse windows of shape `(windows, samples, columns)` are outside the training range, float64 of shape `(windows,)`.
 
-        Args:
-            coarse: Coarse windows of shape `(windows, samples, columns)`.
-
-        Returns:
-            One score per window, float64 of shape `(windows,)`.
+        One per cent of nominal windows score above 1.
         """
         rows = self._rows(coarse)
         scores = np.sqrt(np.mean(rows**2, axis=1, dtype=np.float64)) if self._range is None else self._range.score(rows)
@@ -67,15 +61,9 @@ class TrustedRange:
         return average_windows(lambda rows: np.repeat(scores[rows, None, None], window, axis=1), starts, window, len(coarse))[:, 0]
 
     def share_outside(self, scenario: "Degraded | None", num_windows: int = 200, seed: int = 0) -> float:
-        """Returns the share of a scenario's windows that are outside the training range.
-
-        Args:
-            scenario: A degraded mode, or None for nominal windows.
-            num_windows: Number of windows to simulate.
-            seed: Random seed.
-        """
+        """Returns the share of the windows of a scenario that are outside the training range; None is nominal."""
         return float(np.mean(self.score(self._drawn(scenario, num_windows, 2 + seed)) > 1))
 
     def _drawn(self, scenario: "Degraded | None", num_windows: int, seed: int) -> np.ndarray:
         rng = np.random.default_rng([seed, 3])
-        return self.simulator.alignment.draw(rng.integers(0, _START_RANGE, num_windows), [scenario] * num_windows, rng).coarse
+        return self.simulator.alignment.draw(rng.integers(0, START_RANGE, num_windows), [scenario] * num_windows, rng).coarse

@@ -11,29 +11,23 @@ import numpy as np
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import printable
 from enhsim_tf.simulator.fitting import fit
-from enhsim_tf.simulator.joint import cut, long_enough, split_end
+from enhsim_tf.simulator.joint import long_enough, nrmse, split_end
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions
 from enhsim_tf.simulator.scoring import Scorer, check_fits
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 _NUM_WINDOWS = 300  # of the held-out end, on which errors are measured
 
 
 @dataclasses.dataclass(frozen=True)
 class UpdateReport:
-    """What an update changed.
+    """What an update changed: the state of the old and of the new simulator on the held-out end of the new telemetry.
 
-    Args:
-        channels: Names of the channels.
-        num_samples: Number of samples of the new telemetry.
-        num_held_out: Number of them on which both simulators were judged.
-        before: The old simulator there: `level`, `gain`, `period_s` and `noise_sd` of each channel by name, the error of the enhanced signal
-            (`nrmse`) and the share of flagged samples (`alarms`).
-        after: The same of the new one.
+    A state is `level`, `gain`, `period_s`, `noise_sd` and `nrmse`, the error of the enhanced signal, of each channel by name, and `alarms`, the
+    share of flagged samples.
     """
 
-    channels: tuple[str, ...]
+    channels: list[str]
     num_samples: int
     num_held_out: int
     before: dict[str, Any]
@@ -41,13 +35,12 @@ class UpdateReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all fields in plain JSON types."""
-        return dataclasses.asdict(self) | {"channels": list(self.channels)}
+        return dataclasses.asdict(self)
 
     def lines(self) -> list[str]:
         """Returns the report as lines of text."""
-        lines = [
-            f"{', '.join(self.channels)}: updated with {self.num_samples:,} samples; judged on {self.num_held_out:,} held-out ones of them"
-        ]
+        all_of_them = ", ".join(self.channels)
+        lines = [f"{all_of_them}: updated with {self.num_samples:,} samples; judged on {self.num_held_out:,} held-out ones of them"]
         for name in self.channels:
             parts = []
             for what in ("level", "gain", "period_s", "noise_sd", "nrmse"):
@@ -55,7 +48,7 @@ class UpdateReport:
                 if old is not None and new is not None:
                     parts.append(f"{what.removesuffix('_s')} {old:.5g} -> {new:.5g}")
             lines.append(f"{name}: {', '.join(parts)}")
-        lines.append(f"{', '.join(self.channels)}: flagged samples {self.before['alarms']:.1%} -> {self.after['alarms']:.1%}, set for 1 %")
+        lines.append(f"{all_of_them}: flagged samples {self.before['alarms']:.1%} -> {self.after['alarms']:.1%}, set for 1 %")
         return [printable(line) for line in lines]
 
 
@@ -78,9 +71,7 @@ def update(
         InputError: If the telemetry has other channels or another interval, or is too short.
     """
     check_fits(simulator, telemetry, run)
-    known = {field.name for field in dataclasses.fields(FitOptions)}
-    kept = {name: value for name, value in dict(simulator.trained.get("options", {})).items() if name in known}
-    options = FitOptions(**kept | {"held_out": held_out, "seed": seed})
+    options = FitOptions(**simulator.trained["options"] | {"held_out": held_out, "seed": seed})
     telemetry = dataclasses.replace(telemetry, columns=simulator.channels)
     new, _ = fit(telemetry, run, options)
     new.trained["updates"] = [*simulator.trained.get("updates", ()), {"num_samples": len(telemetry), "held_out": held_out, "seed": seed}]
@@ -88,36 +79,22 @@ def update(
     judged = telemetry if run is None else simulator.recorded_runs().pair(telemetry, run)[0]
     end = long_enough(split_end(judged, held_out)[1], window) or long_enough(judged, window)
     before, after = (_state(each, end, run, seed) for each in (simulator, new))
-    return new, UpdateReport(simulator.channels, len(telemetry), len(end), before, after)
+    return new, UpdateReport(list(simulator.channels), len(telemetry), len(end), before, after)
 
 
-def _state(simulator: EnhancedSimulator, end: Recording, run: Recording | None, seed: int) -> dict[str, Any]:
-    series, window = [part.values for part in end.parts], simulator.window
-    starts = evenly_spaced_starts(series, window, _NUM_WINDOWS)
-    real = cut(series, starts, window)
+def _state(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None, seed: int) -> dict[str, Any]:
+    if run is not None:
+        telemetry, run = simulator.recorded_runs().pair(telemetry, run)
+    real, clean = simulator.windows_and_signal(telemetry, run, _NUM_WINDOWS)
     found: dict[str, Any] = {"level": {}, "gain": {}, "period_s": {}}
     if run is None:
-        aligned = simulator.alignment.align(real)
-        clean, seen = simulator.enhance(*aligned), series
-        for channel, name in enumerate(simulator.channels):
-            wave = simulator.alignment.simulators[channel]
-            found["level"][name] = float(np.median(aligned.shift[:, channel]))
-            found["gain"][name] = float(np.median(aligned.gain[:, channel]))
+        _, shift, gain = simulator.alignment.align(real)
+        for channel, (name, wave) in enumerate(zip(simulator.channels, simulator.alignment.simulators, strict=True)):
+            found["level"][name], found["gain"][name] = (float(np.median(each[:, channel])) for each in (shift, gain))
             if not wave.is_constant:
                 found["period_s"][name] = float(wave.waves[0].period_s)
-    else:
-        paired, coarse = simulator.recorded_runs().pair(end, run)
-        series = [part.values for part in paired.parts]
-        enhanced = [simulator.enhance_run(part.values) for part in coarse.parts]
-        starts = evenly_spaced_starts(series, window, _NUM_WINDOWS)
-        real, clean = cut(series, starts, window), cut(enhanced, starts, window)
-        seen = [own - under for own, under in zip(series, enhanced, strict=True)]
-    spread = np.std(real, axis=(0, 1), dtype=np.float64)
-    errors = np.sqrt(np.mean((real - clean) ** 2, axis=(0, 1), dtype=np.float64)) / np.where(spread > 0, spread, 1.0)
+    for what, each in (("nrmse", nrmse(clean, real)), ("noise_sd", simulator.noise_sd)):
+        found[what] = dict(zip(simulator.channels, each.tolist(), strict=True))
     scorer = Scorer(simulator, ScoreOptions(seed=seed))
-    alarms = np.concatenate([scorer.score_series(each) > 1 for each in seen])
-    by_name = {
-        name: dict(zip(simulator.channels, map(float, each), strict=True))
-        for name, each in (("nrmse", errors), ("noise_sd", simulator.noise_sd))
-    }
-    return found | by_name | {"alarms": float(alarms.mean())}
+    flags = np.concatenate([scorer.score_series(each) > 1 for each in simulator.judged_series(telemetry, run)])
+    return found | {"alarms": float(flags.mean())}

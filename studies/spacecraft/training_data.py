@@ -8,7 +8,7 @@ import numpy as np
 
 from enhsim_tf.common.console import Progress
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.simulator.checks import check_finite
+from enhsim_tf.simulator.simulator import check_finite
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, random_window_starts
 from studies.common.block_bootstrap import BlockBootstrap

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
-from enhsim_tf.coarse_simulator.square_waves import simulate_schedule
 from enhsim_tf.datasets.labelled_windows import draw_schedule
 from enhsim_tf.datasets.places import (
     Place,
@@ -34,8 +33,9 @@ def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
     for before, after in itertools.pairwise(schedule):
         assert after.begin - before.end >= 30
     assert schedule[-1].end <= 3_000 and all(10 <= event.length <= 80 for event in schedule if event not in given)
-    times = INTERVAL_S * np.arange(3_000)
-    nominal, run = COARSE.simulate(times[None])[0], simulate_schedule(COARSE, times, schedule, np.random.default_rng(0))
+    events = [(Degraded(event.mode, event.severity, 0.0), event.begin, event.end) for event in schedule]
+    drawn = SIMULATOR.alignment.draw_series(3_000, events, np.random.default_rng(0))
+    run, nominal = drawn.coarse[0, :, 0], drawn.nominal[0, :, 0]
     for event in schedule:
         assert (run[event.begin : event.end] != nominal[event.begin : event.end]).any()
         nominal[event.begin : event.end] = run[event.begin : event.end]

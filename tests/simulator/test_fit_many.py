@@ -2,9 +2,9 @@ import hashlib
 
 import numpy as np
 import pandas as pd
-import pytest
 
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.parallel.local import ProcessesDiedError
+from enhsim_tf.simulator import fit_many
 from enhsim_tf.simulator.fit_many import fit_channels
 from enhsim_tf.simulator.model_folder import channels_of, models_of, name_of_channels
 from enhsim_tf.simulator.options import FitOptions
@@ -30,6 +30,7 @@ def test_all_channels_become_one_simulator_and_one_that_cannot_is_left_out(tmp_p
     reports, failed, lines = fitted(tmp_path, table(still=np.ones(1_500)))
     assert list(reports) == ["volts~watts"] and list(failed) == ["still"] and "constant" in failed["still"]
     ((name, folder),) = models_of(tmp_path / "models").items()
+    assert name_of_channels([f"channel {number}" for number in range(30)]) == "channel 0~29 more"
     assert name == "volts~watts" and channels_of(folder) == ("volts", "watts")
     assert {path.name for path in folder.iterdir()} == {"arrays.npz", "settings.json", "manifest.json", "report.json", "report.png"}
     assert any("cross-correlation" in line for line in lines)
@@ -51,14 +52,17 @@ def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
     assert sorted(reports) == ["fast", "volts~watts"] and not failed
 
 
-def test_a_folder_with_something_else_is_left_alone(tmp_path):
-    (tmp_path / "models" / "volts").mkdir(parents=True)
-    (tmp_path / "models" / "volts" / "notes.txt").write_text("mine")
-    with pytest.raises(InputError, match="something else"):
-        fitted(tmp_path, table(), separately=True)
-    assert (tmp_path / "models" / "volts" / "notes.txt").read_text() == "mine"
+def test_a_channel_that_kills_its_worker_is_reported_and_stops_no_other(tmp_path, monkeypatch):
+    tried = []
 
+    def run(engine, work, jobs, workers, threads):
+        tried.append(([job.name for job in jobs], workers))
+        for place, job in enumerate(jobs):
+            if job.name == "bad":
+                raise ProcessesDiedError("killed", jobs[place : place + 2])
+            yield fit_many.Outcome(job.name, lines=[job.name])
 
-def test_names_of_many_channels_are_short():
-    assert name_of_channels(["a"]) == "a" and name_of_channels(["a", "b"]) == "a~b"
-    assert name_of_channels([f"channel {number}" for number in range(30)]) == "channel 0~29 more"
+    monkeypatch.setattr(fit_many.engines, "run", run)
+    _, failed, lines = fitted(tmp_path, dict.fromkeys(["a", "bad", "c", "d"]), separately=True, workers=4)
+    assert list(failed) == ["bad"] and "memory" in failed["bad"] and lines == ["a", "c", "d"]
+    assert tried == [(["a", "bad", "c", "d"], 4), (["c"], 1), (["bad"], 1), (["d"], 4)]

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.interface import FunctionSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.options import FitOptions
@@ -16,6 +15,7 @@ def test_the_waveform_below_the_noise_is_recovered(single):
     assert np.sqrt(np.mean((clean - 5 - 2 * smooth_wave(WINDOW)) ** 2)) < 0.05  # half of the noise
     assert simulator.alignment.simulators[0].waves[0].period_s == pytest.approx(10 * PERIOD, rel=1e-3)
     assert report.nrmse["volts"]["enhanced"] < 0.5 * report.nrmse["volts"]["coarse"]
+    assert len(simulator.nominal) == 3_000  # thresholds know all that was given
 
 
 def test_each_channel_keeps_its_phase_level_and_scale(both):
@@ -35,12 +35,6 @@ def test_a_delay_between_run_and_telemetry_is_recovered():
     assert simulator.alignment.delay_s == 70.0 and any("later than the coarse run" in note for note in report.notes)
 
 
-def test_a_function_is_run_at_the_times_of_the_telemetry():
-    wave = FunctionSimulator(lambda time_s: np.sign(np.sin(2 * np.pi * (time_s / 10 + 4) / PERIOD + 1e-6)), ["square"])
-    simulator, report = fit(series(), wave, QUICK)
-    assert report.nrmse["volts"]["enhanced"] < 0.1 and simulator.alignment.coarse is wave
-
-
 def test_telemetry_without_a_period_gets_a_constant_level():
     noise = Telemetry(np.random.default_rng(0).standard_normal(3_000).astype(np.float32), name="noise")
     simulator, report = fit(noise, options=QUICK)
@@ -48,20 +42,14 @@ def test_telemetry_without_a_period_gets_a_constant_level():
     assert np.std(simulator.generate(200)) == pytest.approx(1.0, rel=0.05)
 
 
-def test_a_wave_and_a_level_are_one_simulator():
-    values = np.random.default_rng(1).standard_normal(3_000).astype(np.float32)
-    other = Telemetry(values, 10.0, 0.0, series().start, "noise")
-    simulator, _ = fit({"volts": series(), "noise": other}, options=QUICK)
-    assert [each.is_constant for each in simulator.alignment.simulators] == [False, True]
-    assert np.std(simulator.generate(200), axis=(0, 1))[1] == pytest.approx(1.0, rel=0.05)
-
-
-def test_only_the_channel_that_does_not_follow_its_wave_becomes_a_level():
+def test_only_channels_that_follow_no_wave_become_levels():
     values = series().values.copy()
     values[2_000] += 1e5  # its best square wave is as high as the spike, and all other windows are flat beside it
-    spiky = Telemetry(values, 10.0, 0.0, series().start, "spiky")
-    simulator, _ = fit({"volts": series(seed=1), "spiky": spiky}, options=QUICK)
-    assert [each.is_constant for each in simulator.alignment.simulators] == [False, True]
+    noise = np.random.default_rng(1).standard_normal(3_000).astype(np.float32)
+    others = {name: Telemetry(each, 10.0, 0.0, series().start, name) for name, each in (("spiky", values), ("noise", noise))}
+    simulator, _ = fit({"volts": series(seed=1), **others}, options=QUICK)
+    assert [each.is_constant for each in simulator.alignment.simulators] == [False, True, True]
+    assert np.std(simulator.generate(200), axis=(0, 1))[2] == pytest.approx(1.0, rel=0.05)
 
 
 def test_quantised_channels_stay_on_their_levels():
@@ -80,21 +68,20 @@ def test_the_noise_that_is_asked_for_is_used(name):
     assert simulator.noise_sd[0] == pytest.approx(expected, rel=0.2)
 
 
-def test_thresholds_know_the_nominal_telemetry_that_was_given(single):
-    assert len(single[0].nominal) == 3_000
-
-
-def test_telemetry_that_cannot_be_fitted_is_refused():
-    with pytest.raises(InputError, match="constant 1"):
-        fit(Telemetry(np.ones(1_000, np.float32)))
-    with pytest.raises(InputError, match="at least 256 samples"):
-        fit(series(200))
-    with pytest.raises(InputError, match="2 groups"):
-        fit({"a": series(), "b": Telemetry(series().values, 1.0, 0.0, series().start)})
-    with pytest.raises(InputError, match="overlaps the telemetry"):
-        fit(series(), coarse_run(start="2031-01-01T00:00:00+00:00"))
-    with pytest.raises(InputError, match="8 windows of 500"):
-        fit(series(), options=FitOptions(window=500))
+@pytest.mark.parametrize(
+    ("words", "telemetry", "others"),
+    [
+        ("constant 1", Telemetry(np.ones(1_000, np.float32)), {}),
+        ("at least 256 samples", series(200), {}),
+        ("at least one channel", {}, {}),
+        ("2 groups", {"a": series(), "b": Telemetry(series().values, 1.0, 0.0, series().start)}, {}),
+        ("overlaps the telemetry", series(), {"coarse": coarse_run(start="2031-01-01T00:00:00+00:00")}),
+        ("8 windows of 500", series(), {"options": FitOptions(window=500)}),
+    ],
+)
+def test_telemetry_that_cannot_be_fitted_is_refused(words, telemetry, others):
+    with pytest.raises(InputError, match=words):
+        fit(telemetry, **others)
 
 
 @pytest.mark.parametrize(

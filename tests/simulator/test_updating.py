@@ -31,8 +31,3 @@ def test_a_simulator_of_runs_is_updated_with_the_run_of_the_new_time(of_run, new
     assert report.after["nrmse"]["volts"] < 0.1 < report.before["nrmse"]["volts"]
     enhanced = updated.enhance_run(coarse_run(400).parts[0].values)
     assert enhanced.mean() == pytest.approx(25, rel=0.02) and np.std(enhanced) > 4
-
-
-def test_another_interval_is_refused(single, newer):
-    with pytest.raises(InputError, match="sample every 10 s"):
-        update(single[0], dataclasses.replace(newer, interval_s=1.0))

@@ -1,0 +1,148 @@
+"""The figures of a report and of scores: series of up to three channels, and beside or below them how the detectors do."""
+
+from typing import TYPE_CHECKING
+
+import matplotlib.dates
+import matplotlib.figure
+import matplotlib.style
+import numpy as np
+from matplotlib import font_manager
+
+from enhsim_tf.common.errors import printable
+from enhsim_tf.common.plot_style import (
+    COARSE,
+    DASHED,
+    DOUBLE,
+    EDGE,
+    ENHANCED,
+    GENERATED,
+    LINE,
+    QUIET,
+    REAL,
+    STYLE,
+    new_sheet,
+    panels,
+    title_words,
+)
+from enhsim_tf.simulator.detector_choice import RATE
+from enhsim_tf.simulator.report import Report
+from enhsim_tf.simulator.scoring import events_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
+
+_MOST_CHANNELS = 3
+_MOST_POINTS = 4_000  # of a curve; beyond, the smallest and the largest value of each stretch are drawn
+
+
+def report_figure(report: Report) -> matplotlib.figure.Figure:
+    """Draws a report: for each channel real, coarse and enhanced telemetry, and generated telemetry; false alarms and recall of the detectors."""
+    shown = report.channels[:_MOST_CHANNELS]
+    first, rows = report.nrmse[shown[0]], max(2, len(shown))
+    nearer = 1 - first["enhanced"] / first["coarse"] if first["coarse"] > 0 else 0.0
+    message = f"{drawable(shown[0], 30)}: " + (
+        f"enhanced {nearer:.0%} nearer to the telemetry than coarse" if nearer > 0 else "enhancing brings the coarse signal no nearer"
+    )
+    where = "held-out telemetry" if report.is_held_out else "the telemetry of the fit"
+    subtitle = f"Measured on {where}; noise: {report.noise_model}; detector that score uses: {report.detector}."
+    with matplotlib.style.context(STYLE):
+        figure, down = new_sheet(DOUBLE, 0.9 + 1.77 * rows, message, subtitle)
+        grid = panels(figure, down + 0.24, rows, 3, gap=(0.62, 0.9))
+        for row, name in enumerate(shown):
+            own = {kind: values[:, row] for kind, values in report.examples.items()}
+            signal, made = grid[row, :2]
+            signal.plot(own["real"], color=REAL, linewidth=0.7)
+            signal.plot(own["coarse"], color=COARSE, linewidth=1.0, linestyle=DASHED, zorder=3)
+            signal.plot(own["enhanced"], color=ENHANCED, linewidth=1.5)
+            made.plot(own["generated"], color=GENERATED, linewidth=0.7)
+            for axes in (signal, made):
+                axes.locator_params(axis="y", nbins=4)
+                axes.ticklabel_format(axis="y", useOffset=False)
+                axes.set_xlabel("sample" if row == len(shown) - 1 else "")
+            signal.set_ylabel(drawable(name, 14))
+        title_words(grid[0, 0], [("real", REAL), ("coarse (dashed)", COARSE), ("enhanced", ENHANCED)])
+        title_words(grid[0, 1], [("generated", GENERATED)])
+        names = [each["name"] for each in report.detectors]
+        for axes, key, label in (
+            (grid[0, 2], "false_alarms", f"false alarms (%),\nset for {RATE:.0%} (line)"),
+            (grid[1, 2], "recall", "injected anomalies\nfound (%)"),
+        ):
+            values = [100 * each[key] for each in report.detectors]
+            axes.hlines(range(len(names)), 0, values, color=QUIET, linewidth=0.8)
+            for place, (name, value) in enumerate(zip(names, values, strict=True)):
+                is_used = name == report.detector
+                axes.plot(value, place, "o", color=ENHANCED if is_used else REAL, markersize=5 if is_used else 3, clip_on=False)
+            axes.set_yticks(range(len(names)), names, fontsize=6)
+            axes.set_ylim(len(names) - 0.6, -0.6)
+            axes.set_xlim(0, max(2.0, *values) if key == "false_alarms" else 100)
+            axes.set_xlabel(label)
+        grid[0, 2].axvline(100 * RATE, color=LINE, linewidth=0.6, zorder=0)
+        for unused in (*grid[len(shown) :, :2].flat, *grid[2:, 2]):
+            unused.remove()
+        _foot(figure, f"enhsim-tf fit · windows of {report.window:,} samples")
+    return figure
+
+
+def score_figure(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: str) -> matplotlib.figure.Figure:
+    """Draws scored telemetry: series, enhanced run if there is one, scores and events.
+
+    Args:
+        frame: Scores, as returned by `scoring.score`.
+        simulator: The simulator.
+        name: Name of the source.
+    """
+    single = len(simulator.channels) == 1
+    channels = ["value"] if single else list(simulator.channels[:_MOST_CHANNELS])
+    number = len(events_table(frame))
+    title = f"{drawable(name, 30)}: {number:,} {'event' if number == 1 else 'events'}, {frame['flag'].mean():.1%} of samples flagged"
+    subtitle = f"Detector: {frame.attrs['detector']}. Shaded: events. Dashed: threshold."
+    rows, has_time = len(channels) + 1, hasattr(frame.index, "tz")
+    times = frame.index.tz_convert(None) if has_time and frame.index.tz is not None else frame.index
+    with matplotlib.style.context(STYLE):
+        figure, down = new_sheet(DOUBLE, 1.0 + 1.15 * rows, title, subtitle)
+        axes = panels(figure, down + 0.2, rows, 1, sharex=True)[:, 0]
+        for row, channel in enumerate(channels):
+            _curve(axes[row], times, frame[channel].to_numpy(), REAL, 0.6)
+            enhanced = "enhanced" if single else f"enhanced {channel}"
+            if enhanced in frame:
+                _curve(axes[row], times, frame[enhanced].to_numpy(), ENHANCED, 1.0)
+                title_words(axes[row], [("telemetry", REAL), ("enhanced run", ENHANCED)] if row == 0 else [])
+            axes[row].set_ylabel(drawable(simulator.channels[row], 14))
+        _curve(axes[-1], times, frame["score"].to_numpy(), REAL, 0.7)
+        axes[-1].axhline(1, color=QUIET, linewidth=0.8, linestyle=DASHED)
+        axes[-1].set_ylabel("score")
+        if np.nanmax(frame["score"].to_numpy(), initial=0.0) > 20:
+            axes[-1].set_yscale("log")
+        for event in frame.attrs["events"]:
+            begin, end = times[event["begin"]], times[min(event["end"], len(times) - 1)]
+            for each in axes:
+                each.axvspan(begin, end, color=GENERATED, alpha=0.3, linewidth=0)
+        if has_time:
+            locator = matplotlib.dates.AutoDateLocator(minticks=3, maxticks=7)
+            axes[-1].xaxis.set_major_locator(locator)
+            axes[-1].xaxis.set_major_formatter(matplotlib.dates.ConciseDateFormatter(locator))
+        axes[-1].set_xlabel("time (UTC)" if has_time else "sample")
+        _foot(figure, f"enhsim-tf score · {len(frame):,} samples")
+    return figure
+
+
+def _foot(figure: matplotlib.figure.Figure, text: str) -> None:
+    figure.text(EDGE / DOUBLE, 0.08 / figure.get_size_inches()[1], text, size=7, color=QUIET)
+
+
+def _curve(axes, times, values: np.ndarray, color: str, width: float) -> None:  # noqa: ANN001
+    """Draws a series; of a long one the envelope, so that no spike is lost."""
+    if len(values) > _MOST_POINTS:
+        edges = np.linspace(0, len(values), _MOST_POINTS // 2 + 1).astype(int)[:-1]
+        low, high = np.fmin.reduceat(values, edges), np.fmax.reduceat(values, edges)
+        times, values = np.repeat(np.asarray(times)[edges], 2), np.stack([low, high], axis=1).ravel()
+    axes.plot(times, values, color=color, linewidth=width)
+
+
+def drawable(text: str, most_letters: int) -> str:
+    """Returns text as one line that the font can draw: unknown characters are replaced, `$` is escaped, and longer text is shortened."""
+    letters = font_manager.get_font(font_manager.findfont("DejaVu Sans")).get_charmap()
+    known = "".join(letter if ord(letter) in letters else "?" for letter in printable(text))
+    return (known if len(known) <= most_letters else f"{known[: most_letters - 3]}...").replace("$", r"\$")
