@@ -86,7 +86,6 @@ def refuse(number):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("out")
-    parser.add_argument("--engine", default="local")
     parser.add_argument("--limit", type=int, help="bytes that a file may have")
     parser.add_argument("--user", type=int, help="whose rights to have, once everything is imported")
     options = parser.parse_args()
@@ -99,7 +98,7 @@ def main():
     generate.ShardMaker = SlowMaker
 
     def run():
-        generate.generate_data_set(options.out, plan(), 2, options.engine)
+        generate.generate_data_set(options.out, plan(), 2)
         return 0
 
     return run_command(run, "interrupted; what was finished is kept")

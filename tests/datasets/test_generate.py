@@ -358,22 +358,6 @@ def test_killed_and_interrupted_runs_are_recovered_bit_for_bit(who, seed, undist
 
 
 @pytest.mark.slow
-def test_a_run_goes_on_when_a_machine_of_its_cluster_is_lost(undisturbed, tmp_path):
-    cluster_utils = pytest.importorskip("ray.cluster_utils", reason="the optional extra ray is not installed")
-    cluster = cluster_utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
-    try:
-        node = cluster.add_node(num_cpus=1)
-        process = started(tmp_path / "set", "--engine", "ray", env=os.environ | {"RAY_ADDRESS": cluster.address, "PYTHONPATH": str(ROOT)})
-        while not list((tmp_path / "set").glob("shard-*")) and process.poll() is None:
-            time.sleep(0.01)
-        cluster.remove_node(node, allow_graceful=False)
-        process.communicate()
-        assert process.returncode == 0 and content_of(tmp_path / "set") == content_of(undisturbed)
-    finally:
-        cluster.shutdown()
-
-
-@pytest.mark.slow
 def test_a_full_disk_gives_one_line_and_a_later_run_finishes(undisturbed, tmp_path):
     folder = tmp_path / "set"
     process = started(folder, "--limit", 9_000)  # limits the size of files, which for a program looks like a full disk
@@ -425,6 +409,28 @@ def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monk
     generate_data_set(tmp_path / "serial", make_plan(read_mix(mix), models, 5, 150), tell=lambda line: None)
     assert content_of(tmp_path / "set") == content_of(tmp_path / "serial")
     assert main(["verify", str(tmp_path / "set")]) == 0 and capsys.readouterr().out == "150 windows in 3 shards, all intact\n"
+
+
+@pytest.mark.slow
+def test_a_run_goes_on_when_a_machine_of_its_cluster_is_lost(models, tmp_path, monkeypatch):
+    cluster_utils = pytest.importorskip("ray.cluster_utils", reason="the optional extra ray is not installed")
+    (tmp_path / "mix.yaml").write_text("windows: 6000\nshard: 50\nseed: 5\n")
+    command = [sys.executable, "-m", "enhsim_tf", "generate", models / "volts", "--scenarios", tmp_path / "mix.yaml", "--engine", "ray"]
+    cluster = cluster_utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    try:
+        node = cluster.add_node(num_cpus=1)
+        environment = os.environ | {"RAY_ADDRESS": cluster.address, "PYTHONPATH": str(ROOT)}
+        process = subprocess.Popen([*command, "--out", tmp_path / "set"], env=environment, stderr=subprocess.PIPE, text=True)
+        while not list((tmp_path / "set").glob("shard-*")) and process.poll() is None:
+            time.sleep(0.01)
+        cluster.remove_node(node, allow_graceful=False)
+        error = process.communicate()[1]
+        assert process.returncode == 0, error
+    finally:
+        cluster.shutdown()
+    monkeypatch.setattr(generate.engines, "run", serial)
+    generate_data_set(tmp_path / "serial", make_plan(read_mix(tmp_path / "mix.yaml"), models / "volts", 5, 6_000), tell=lambda line: None)
+    assert content_of(tmp_path / "set") == content_of(tmp_path / "serial")
 
 
 def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, capsys):
