@@ -115,9 +115,9 @@ class Enhancer:
         return made
 
 
-def run_starts(num_samples: int, window: int) -> np.ndarray:
-    """Returns the starts of overlapping windows that cover a run, one each quarter of a window and the last one at its end."""
-    return np.unique(np.append(np.arange(0, num_samples - window + 1, max(1, window // 4)), num_samples - window))
+def run_starts(num_samples: int, window: int, hop: int | None = None) -> np.ndarray:
+    """Returns the starts of windows that cover a run, one each `hop` samples (None: a quarter of a window) and the last one at its end."""
+    return np.unique(np.append(np.arange(0, num_samples - window + 1, hop or max(1, window // 4)), num_samples - window))
 
 
 def average_windows(windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int) -> np.ndarray:
