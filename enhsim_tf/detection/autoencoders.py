@@ -30,7 +30,7 @@ class DenseAutoencoder:
         units, samples = (self.num_hidden, self.num_code, self.num_hidden), windows.shape[1]
         self._network = dense_stack(samples, (*units, samples), seed=self.seed, name="autoencoder")
         scaled = self._scaled(windows)
-        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, verbose=0, jit_compile=False)
+        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -69,7 +69,7 @@ class ConvolutionalAutoencoder:
         self._mean, self._scale = np.mean(windows), np.std(windows)
         self._network = self._build(windows.shape[1])
         scaled = self._scaled(windows)
-        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, learning_rate=0.003, verbose=0)
+        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, learning_rate=0.003)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.backend import keras
-from enhsim_tf.common.blockwise_training import BlockwiseTraining, is_wide_dense_stack
-from enhsim_tf.common.fused_adam import fused_adam
+from enhsim_tf.common.fast_keras import BlockwiseTraining, fused_adam, is_wide_dense_stack
 from enhsim_tf.paper.settings import Settings
 
 

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.backend import keras, tf
-from enhsim_tf.common.convolution_maximum import with_fast_convolution
-from enhsim_tf.common.fused_adam import fused_adam
+from enhsim_tf.common.fast_keras import fused_adam, with_fast_convolution
 from enhsim_tf.paper.enhancer import initialiser, predict
 from enhsim_tf.paper.settings import Settings
 

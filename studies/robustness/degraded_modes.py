@@ -142,12 +142,13 @@ class DegradedModes:
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
         """Trains the enhancer of the residual pipeline on other windows."""
         from enhsim_tf.common.backend import keras
-        from enhsim_tf.common.training import EpochProgress, dense_stack, fit_windows
+        from enhsim_tf.common.training import dense_stack, fit_windows
 
         seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.paper.batch_size
         window, units = self.settings.paper.window, self.settings.paper.hidden_units
         network = dense_stack(window, (window, units, units, window), seed, "enhancer")
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(coarse) // batch_size))
-        callbacks = [EpochProgress(self.stages.progress.loop("enhancer, epoch", epochs))]
-        fit_windows(network, coarse, target, epochs, batch_size, seed, rate, callbacks=callbacks, verbose=0)
+        told = self.stages.progress.loop("enhancer, epoch", epochs)
+        watch = keras.callbacks.LambdaCallback(on_epoch_end=lambda epoch, logs: told(epoch + 1))
+        fit_windows(network, coarse, target, epochs, batch_size, seed, rate, callbacks=[watch])
         return network

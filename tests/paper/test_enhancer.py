@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.common.blockwise_training import is_wide_dense_stack
+from enhsim_tf.common.fast_keras import is_wide_dense_stack
 from enhsim_tf.paper.enhancer import Pairs, build_enhancer, enhance, train_enhancer
 from enhsim_tf.paper.settings import make_settings
 from tests.paper.conftest import tiny_settings
