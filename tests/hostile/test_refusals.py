@@ -4,40 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from enhsim_tf.reproduce import main
-from tests.paper.conftest import TINY_OPTIONS
 
 ROOT = Path(__file__).parents[2]
-
-
-def _wave(num_samples=4_000):
-    return np.sin(np.arange(num_samples) / 15) + 0.1 * np.random.default_rng(0).standard_normal(num_samples)
-
-
-def _table(path, **columns):
-    import pandas as pd
-
-    table = pd.DataFrame(columns)
-    table.to_csv(path, index=False) if path.suffix == ".csv" else table.to_parquet(path)
-
-
-def _array(values, **options):
-    return lambda path: np.save(path, values, **options)
-
-
-BAD_FILES = {  # what else a file may hold is tried in tests/telemetry and tests/fuzzing
-    "missing": ("x.npy", lambda path: None, []),
-    "a folder": ("x.npy", lambda path: path.mkdir(), []),
-    "no rows": ("x.csv", lambda path: path.write_text("value\n"), []),
-    "constant": ("x.npy", _array(np.full(4_000, 3.0)), []),
-    "too short": ("x.npy", _array(_wave(999)), []),
-    "which column": ("x.npy", _array(np.zeros((4_000, 2))), []),
-    "time column": ("x.csv", lambda path: _table(path, a=_wave()), ["--time", "utc"]),
-    "a word among the times": ("x.csv", lambda path: _table(path, a=_wave(), t=[*range(3_999), "soon"]), ["--column", "a", "--time", "t"]),
-}
 
 
 @pytest.fixture
@@ -70,14 +41,6 @@ def refused_line(told, tmp_path):
     return run
 
 
-@pytest.mark.filterwarnings("error")  # a warning would be a second line
-@pytest.mark.parametrize("case", BAD_FILES)
-def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
-    name, write, arguments = BAD_FILES[case]
-    write(tmp_path / name)
-    assert name[:50] in refused_line("--telemetry", tmp_path / name, *arguments)
-
-
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
@@ -86,8 +49,6 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
         (["--only", "fig99"], "fig99"),
         (["--only", "fig0"], "fig0"),
         (["--only", ""], "--only"),
-        (["--column", "0"], "--telemetry"),
-        (["--time", "t"], "--telemetry"),
         (["--seed", "abc"], "'abc'"),
         (["--budget", "tiny"], "'tiny'"),
         (["--seed"], "--seed"),
@@ -95,7 +56,6 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
         (["--set", "dropout"], "dropout"),
         (["--set", "no_such=1"], "no_such"),
         (["--experiment", "robustness"], "--experiment"),
-        (["--telemetry"], "--telemetry"),
     ],
 )
 def test_a_bad_option_is_refused_in_one_line(refused_line, arguments, word):
@@ -125,7 +85,7 @@ def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch,
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["--telemetry", "no/such/file.npy"],
+        ["--set", "no_such=1"],
         ["--out", "README.md/below"],
     ],
 )
@@ -136,23 +96,3 @@ def test_a_refusal_as_the_shell_sees_it(tmp_path, arguments):
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1 and done.stderr.startswith("error: Expected ")
     assert not list(tmp_path.iterdir())
-
-
-STRANGE = {
-    "barely long enough": _wave(800),
-    "a ramp without noise": np.arange(3_000.0),
-    "one step": (np.arange(3_000) > 1_500).astype(np.float64),
-    "still in training": np.concatenate([np.ones(2_200), _wave(800)]),
-    "still in the test": np.concatenate([_wave(2_000), np.ones(1_000)]),
-}
-
-
-@pytest.mark.parametrize("case", [pytest.param(name, marks=[pytest.mark.slow] * (name == "barely long enough")) for name in STRANGE])
-def test_an_unusual_channel_gets_its_figures_or_one_error_line_before_training(told, tmp_path, case):
-    np.save(tmp_path / "channel.npy", STRANGE[case])
-    code, _, lines = told("--budget", "smoke", *TINY_OPTIONS, "--only", "fig13", "--telemetry", tmp_path / "channel.npy")
-    if code == 0:
-        assert not lines and any((tmp_path / "out").glob("fig13*.png"))
-    else:
-        assert code == 2 and len(lines) == 1 and lines[0].startswith("error: Expected ")
-        assert not list((tmp_path / "out").glob("*")) and not list((tmp_path / "cache").glob("enhancer-*"))
