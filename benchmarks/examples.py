@@ -1,4 +1,4 @@
-"""Example data for all compared implementations, and the timing of an epoch. This module imports neither TensorFlow nor enhsim_tf.
+"""What the compared implementations share: data, the GAN's networks, and the timing of an epoch. It imports neither TensorFlow nor ours.
 
 Each implementation must run as its users would run it. If enhsim_tf were imported in the same process, TensorFlow would
 start with the settings of enhsim_tf.
@@ -6,7 +6,7 @@ start with the settings of enhsim_tf.
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +27,29 @@ def example_windows(num_windows: int, window: int) -> tuple[np.ndarray, np.ndarr
     coarse = 0.5 * np.sign(np.sin(phase)) + 0.25 * np.sign(np.sin(4 * phase))
     truth = 0.5 * np.sin(phase) + 0.25 * np.sin(4 * phase)
     return coarse.astype(np.float32), (truth + rng.normal(0, 0.1, truth.shape)).astype(np.float32)
+
+
+def gan_networks(keras: Any, window: int, filters: int, dropout: float) -> tuple["keras.Model", "keras.Model"]:
+    """Builds the paper's generator and discriminator with a Keras of any age."""
+    layers, kernel = keras.layers, {"kernel_initializer": "he_uniform"}
+    drop = (lambda: [layers.Dropout(dropout)]) if dropout else list
+    generator = [
+        keras.Input((16,)),
+        layers.Dense(64, activation="relu", **kernel),
+        layers.BatchNormalization(),
+        layers.Dense(window, activation="tanh", **kernel),
+        layers.Reshape((window, 1)),
+    ]
+    discriminator = [
+        keras.Input((window, 1)),
+        layers.Conv1D(filters, 20, strides=4, activation="relu", **kernel),
+        *drop(),
+        layers.GlobalMaxPooling1D(),
+        layers.Dense(25, activation="relu", **kernel),
+        *drop(),
+        layers.Dense(1, activation="sigmoid", **kernel),
+    ]
+    return keras.Sequential(generator), keras.Sequential(discriminator)
 
 
 def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], float]]:

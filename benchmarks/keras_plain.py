@@ -5,7 +5,7 @@ import numpy as np
 import tensorflow as tf
 from keras import layers
 
-from benchmarks.examples import Work, epoch_clock, example_windows
+from benchmarks.examples import Work, epoch_clock, example_windows, gan_networks
 
 
 def enhancer(window: int, hidden_units: int) -> keras.Model:
@@ -13,32 +13,6 @@ def enhancer(window: int, hidden_units: int) -> keras.Model:
     widths = (window, hidden_units, hidden_units)
     hidden = [layers.Dense(width, activation="relu", kernel_initializer="he_uniform") for width in widths]
     return keras.Sequential([keras.Input((window,)), *hidden, layers.Dense(window, kernel_initializer="he_uniform")])
-
-
-def networks(window: int, filters: int, dropout: float) -> tuple[keras.Model, keras.Model]:
-    """Builds the paper's generator and discriminator."""
-    generator = keras.Sequential(
-        [
-            keras.Input((16,)),
-            layers.Dense(64, activation="relu", kernel_initializer="he_uniform"),
-            layers.BatchNormalization(),
-            layers.Dense(window, activation="tanh", kernel_initializer="he_uniform"),
-            layers.Reshape((window, 1)),
-        ]
-    )
-    drop = (lambda: [layers.Dropout(dropout)]) if dropout else list
-    discriminator = keras.Sequential(
-        [
-            keras.Input((window, 1)),
-            layers.Conv1D(filters, 20, strides=4, activation="relu", kernel_initializer="he_uniform"),
-            *drop(),
-            layers.GlobalMaxPooling1D(),
-            layers.Dense(25, activation="relu", kernel_initializer="he_uniform"),
-            *drop(),
-            layers.Dense(1, activation="sigmoid", kernel_initializer="he_uniform"),
-        ]
-    )
-    return generator, discriminator
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -57,7 +31,7 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
     """Prepares GAN iterations by a straightforward `tf.function` with three gradient tapes and the Conv1D layer of Keras."""
-    generator, discriminator = networks(window, filters, dropout)
+    generator, discriminator = gan_networks(keras, window, filters, dropout)
     loss = keras.losses.BinaryCrossentropy()
     of_discriminator, of_generator = keras.optimizers.Adam(), keras.optimizers.Adam()
     of_discriminator.build(discriminator.trainable_variables)
@@ -87,7 +61,7 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
 
 def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:
     """Prepares the generation of windows by `predict` of both networks."""
-    enhancing, (generator, _) = enhancer(window, hidden_units), networks(window, 500, 0.0)
+    enhancing, (generator, _) = enhancer(window, hidden_units), gan_networks(keras, window, 500, 0.0)
     coarse, _ = example_windows(num_windows, window)
     latent = np.random.default_rng(0).normal(size=(num_windows, 16)).astype(np.float32)
     return lambda: enhancing.predict(coarse, verbose=0) + generator.predict(latent, verbose=0)[:, :, 0], num_windows

@@ -59,16 +59,7 @@ def in_turns(ways: Mapping[str, Callable[[], float]], repetitions: int) -> dict[
 def compared(
     work: str, ours: Sequence[float], comparison: str, theirs: Sequence[float], unit: str = "ms", target: float | None = None
 ) -> dict:
-    """Returns a row.
-
-    Args:
-        work: What is timed.
-        ours: Seconds of enhsim_tf, one number for each repetition.
-        comparison: What it is compared with.
-        theirs: Seconds of the comparison, in the same order.
-        unit: Unit of the times in the row, ms or s.
-        target: What the median ratio should not exceed, if there is a target.
-    """
+    """Returns a row from seconds of ours and of a comparison, one for each repetition, and a target for the median ratio, if there is one."""
     factor = {"ms": 1e3, "s": 1.0}[unit]
     return {
         "work": work,

@@ -4,36 +4,15 @@ The loop needs legacy Keras. In Keras 3, setting `trainable = False` before comp
 discriminator permanently, so the loop would be fast but wrong. Before the timing, a check ensures that the discriminator learns.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 import tf_keras as keras
-from tf_keras import layers
+
+from benchmarks.examples import Work, gan_networks
 
 
-def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> tuple[Callable[[], object], int]:
+def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
     """Prepares iterations with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
-    generator = keras.Sequential(
-        [
-            keras.Input((16,)),
-            layers.Dense(64, activation="relu", kernel_initializer="he_uniform"),
-            layers.BatchNormalization(),
-            layers.Dense(window, activation="tanh", kernel_initializer="he_uniform"),
-            layers.Reshape((window, 1)),
-        ]
-    )
-    drop = (lambda: [layers.Dropout(dropout)]) if dropout else list
-    discriminator = keras.Sequential(
-        [
-            keras.Input((window, 1)),
-            layers.Conv1D(filters, 20, strides=4, activation="relu", kernel_initializer="he_uniform"),
-            *drop(),
-            layers.GlobalMaxPooling1D(),
-            layers.Dense(25, activation="relu", kernel_initializer="he_uniform"),
-            *drop(),
-            layers.Dense(1, activation="sigmoid", kernel_initializer="he_uniform"),
-        ]
-    )
+    generator, discriminator = gan_networks(keras, window, filters, dropout)
     discriminator.compile(loss="binary_crossentropy", optimizer="adam", metrics=["accuracy"])
     discriminator.trainable = False
     combined = keras.Sequential([generator, discriminator])

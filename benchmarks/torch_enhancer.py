@@ -1,12 +1,12 @@
 """Comparison: the enhancer in PyTorch with its fused Adam. It needs `pip install -e ".[benchmarks]"`."""
 
-from collections.abc import Callable
-
 import numpy as np
 import torch
 
+from benchmarks.examples import Work
 
-def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> tuple[Callable[[], object], int]:
+
+def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
     """Prepares training steps of 15 windows in random order."""
     widths = (window, window, hidden_units, hidden_units, window)
     stack = []

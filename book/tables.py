@@ -23,17 +23,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?")
 
 
 def refresh(root: Path) -> list[Path]:
-    """Writes each table between its markers.
-
-    Args:
-        root: Folder of the project.
-
-    Returns:
-        The pages.
-
-    Raises:
-        InputError: If the markers of a table are not once on its page.
-    """
+    """Writes each table between its markers on the pages of a clone, and returns the pages."""
     texts = {path: path.read_text(encoding="utf-8") for path in {root / page for page, _ in TABLES.values()}}
     for name, (page, table) in TABLES.items():
         texts[root / page] = fill_part(texts[root / page], name, table(root), page)
@@ -46,7 +36,8 @@ def refresh(root: Path) -> list[Path]:
 def stale(root: Path) -> Iterator[str]:
     """Yields the name and page of each table that differs from what `refresh` would write by more than `TOLERANCE`."""
     for name, (page, table) in TABLES.items():
-        if not agree(part(root / page, name), table(root)):
+        text = (root / page).read_text(encoding="utf-8")
+        if not agree(text, fill_part(text, name, table(root), page)):
             yield f"{name} in {page}"
 
 
@@ -58,38 +49,13 @@ def agree(old: str, new: str) -> bool:
     return all(math.isclose(*pair, rel_tol=TOLERANCE, abs_tol=0.02) for pair in zip(*numbers, strict=True))
 
 
-def part(page: Path, name: str) -> str:
-    """Returns the marked table of a page.
-
-    Raises:
-        InputError: If the markers are not once on the page.
-    """
-    found = _marked(name).findall(page.read_text(encoding="utf-8"))
-    if len(found) != 1:
-        raise InputError(f"Expected the markers of '{name}' once in {page.name}. Received: {len(found)}. Put them back.")
-    return found[0][1]
-
-
 def fill_part(text: str, name: str, content: str, where: str) -> str:
-    """Replaces the text between the markers of a table.
-
-    Args:
-        text: Markdown that holds the markers once.
-        name: The name in the markers.
-        content: The table.
-        where: The text's name, for the error.
-
-    Raises:
-        InputError: If the markers are not there once.
-    """
-    text, count = _marked(name).subn(lambda match: f"{match[1]}{content}\n{match[3]}", text)
+    """Replaces the text between the markers of a table, which the page `where` must hold once."""
+    marked = re.compile(rf"(<!-- {name}: generated -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
+    text, count = marked.subn(lambda match: f"{match[1]}{content}\n{match[2]}", text)
     if count != 1:
         raise InputError(f"Expected the markers of '{name}' once in {where}. Received: {count}. Put them back.")
     return text
-
-
-def _marked(name: str) -> re.Pattern:
-    return re.compile(rf"(<!-- {name}: generated -->\n)(.*?)\n?(<!-- end of {name} -->)", re.DOTALL)
 
 
 def verdicts(root: Path) -> str:

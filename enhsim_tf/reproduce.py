@@ -7,7 +7,7 @@ import sys
 import time
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, write_json
 from enhsim_tf.common.console import Parser, run_command, tell
@@ -15,22 +15,19 @@ from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.common.stages import Stages, default_cache
 
 if TYPE_CHECKING:
-    from enhsim_tf.paper.pipeline import Pipeline
     from enhsim_tf.paper.settings import Settings
     from enhsim_tf.paper.telemetry import Telemetry
 
 PROGRAM = "python -m enhsim_tf.reproduce"
-EXAMPLE = "the paper's example"
 EXAMPLES = f"""\
 examples:
   {PROGRAM}                            everything at full budget, in minutes
   {PROGRAM} --budget smoke             every step with small counts, written to smoke/
   {PROGRAM} --only fig04               one figure and the stages that it needs
   {PROGRAM} --set dropout=0            another reading of the paper; the decisions page lists all settings
-  {PROGRAM} --telemetry my.csv --column volts --time utc --out my_figures
   {PROGRAM} --store influxdb           with the server given by INFLUXDB_V2_URL, _TOKEN and _ORG
 
-exit code: 0 every measurement lies within its published range (or none is published), 1 one does not, 2 an input or option cannot be used
+exit code: 0 every measurement lies within its published range, 1 one does not, 2 an input or option cannot be used
 """
 
 
@@ -48,9 +45,6 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of finished stages (default: .cache, or ENHSIM_TF_CACHE)")
     parser.add_argument("--fresh", action="store_true", help="makes all stages again")
-    parser.add_argument("--telemetry", type=Path, metavar="PATH", help="runs the pipeline on a real channel: .npy, .csv or .parquet")
-    parser.add_argument("--column", help="its column with the values")
-    parser.add_argument("--time", help="its column with the timestamps")
     parser.add_argument("--store", default="parquet", metavar="STORE", help="parquet, influxdb, or influxdb://bucket/measurement/field")
     return parser.parse_args(arguments)
 
@@ -66,38 +60,17 @@ def read_settings(options: argparse.Namespace) -> "Settings":
 
 
 def choose_folder(options: argparse.Namespace) -> Path:
-    """The output folder. Only a run of the reference on the example writes to `figures` of its own accord."""
+    """The output folder. Only a run of the reference writes to `figures` of its own accord."""
     default = "smoke" if options.budget == "smoke" else "figures"
-    if options.telemetry is not None:
-        default = f"{default}_{options.telemetry.stem}"
-    elif options.set:
+    if options.set:
         default = f"{default}_changed"
     if options.out is not None and options.budget == "smoke" and options.out.resolve() == Path("figures").resolve():
         raise InputError("Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures.")
     return options.out or Path(default)
 
 
-def own_channel(options: argparse.Namespace, settings: "Settings") -> dict[str, Any]:
-    """Telemetry of one's own and its square wave, found by the tool's reader and its search for a period."""
-    from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
-    from enhsim_tf.paper.telemetry import START, Telemetry, samples_needed
-    from enhsim_tf.telemetry.sources import read_telemetry
-
-    least = samples_needed(settings.window, settings.moving_average)
-    read = read_telemetry(options.telemetry, options.column, options.time, least)
-    wave = SquareWaveSimulator.fit(read.part(0, len(read) // 2))
-    offset, scale = level_offset_and_scale(wave)
-    start = (read.start or START).replace("+00:00", "Z")
-    own = Telemetry(((read.values - offset) / scale).astype("float32"), read.interval_s, start, printable(read.name))
-    return {"own": own, "own_simulator": lambda time: (wave(time + read.offset_s) - offset) / scale}
-
-
 class InfluxTelemetry:
-    """The paper's store: a measurement in InfluxDB 2, through the tool's client.
-
-    Args:
-        place: `influxdb`, or `influxdb://bucket/measurement/field`.
-    """
+    """The paper's store: a measurement in InfluxDB 2, through the tool's client. The place is that of the option `--store`."""
 
     def __init__(self, place: str):
         from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
@@ -130,56 +103,40 @@ class InfluxTelemetry:
 def run(options: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
     began = time.perf_counter()
-    if options.telemetry is None and (options.column or options.time):
-        raise InputError("Expected --column and --time together with --telemetry. Received: one of them alone.")
     settings, folder = read_settings(options), choose_folder(options)
-    place = {} if options.store == "parquet" else {"store": InfluxTelemetry(options.store)}
-    place |= own_channel(options, settings) if options.telemetry else {}
+    store = None if options.store == "parquet" else InfluxTelemetry(options.store)
     folder, cache = make_folder(folder), make_folder(options.cache or default_cache())
     remove_leftovers(folder)
 
     # the seconds of TensorFlow begin here, after all cheap checks
     from enhsim_tf.paper.claims import judge_all, outside, title
-    from enhsim_tf.paper.figures import FIGURES
+    from enhsim_tf.paper.figures import FIGURES, save_figure
     from enhsim_tf.paper.pipeline import Pipeline
     from enhsim_tf.paper.report import as_text, read_published, results, write_page
 
+    stages = Stages(cache, options.fresh, tell, speaks=True)
+    pipeline = Pipeline(settings, stages, store)
     chosen = [name for name in FIGURES if options.only in (None, name.split("_")[0])]
-    pipeline = Pipeline(settings, Stages(cache, options.fresh, tell, speaks=True), **place)
-    _ = pipeline.noise_unit  # telemetry that cannot be used is refused before anything is drawn or trained
-    early = [name for name in chosen if not FIGURES[name].needs_training]
-    draw(early, pipeline, folder, options)
-    if early:
-        tell(f"{len(early)} figures without training in {folder}/")
-    draw([name for name in chosen if name not in early], pipeline, folder, options)
+    for name in sorted(chosen, key=lambda name: FIGURES[name].needs_training):
+        caption = f"seed {options.seed} · {options.budget} budget · {command_line(options, name)}"
+        save_figure(name, pipeline, folder, caption, options.budget == "smoke")
     if options.only:
         return 0
 
     records, published = judge_all(pipeline), read_published()
-    stages = pipeline.stages
     about = {
         "budget": options.budget,
         "seconds": time.perf_counter() - began,
         "stages": stages.seconds,
         "from_cache": [name for name, kept in stages.cached.items() if kept],
-        "telemetry": pipeline.telemetry.name if options.telemetry else EXAMPLE,
         "command": command_line(options),
     }
     found = results(records, title(records), settings, published, **about)
     write_json(folder / "results.json", found)
     tell(f"\n{as_text(found['box'])}\n")
-    tell(f"published {found['published']['title'] or '-'}   this run {found['title']}   {about['seconds']:.0f} s")
+    tell(f"published {published['title']}   this run {found['title']}   {about['seconds']:.0f} s")
     tell(f"figures, results.json and the whole run on one page: {write_page(folder, found, settings)}")
-    return conclude(options, outside(records, published) if published else None)
-
-
-def draw(names: list[str], pipeline: "Pipeline", folder: Path, options: argparse.Namespace) -> None:
-    """Draws figures."""
-    from enhsim_tf.paper.figures import save_figure
-
-    for name in names:
-        caption = f"seed {options.seed} · {options.budget} budget · {command_line(options, name)}"
-        save_figure(name, pipeline, folder, caption, options.budget == "smoke")
+    return conclude(options, outside(records, published))
 
 
 def command_line(options: argparse.Namespace, figure: str = "") -> str:
@@ -187,19 +144,14 @@ def command_line(options: argparse.Namespace, figure: str = "") -> str:
     words = [] if options.budget == "full" else ["--budget", options.budget]
     words += ["--seed", str(options.seed)] if options.seed else []
     words += [word for text in options.set for word in ("--set", text)]
-    for name in ("telemetry", "column", "time"):
-        words += [f"--{name}", Path(value).name if name == "telemetry" else value] if (value := getattr(options, name)) else []
     words += ["--store", options.store] if options.store != "parquet" else []
     return printable(shlex.join([*PROGRAM.split(), *words, *(["--only", figure.split("_")[0]] if figure else [])]))
 
 
-def conclude(options: argparse.Namespace, different: list[str] | None) -> int:
+def conclude(options: argparse.Namespace, different: list[str]) -> int:
     """Tells how the measurements compare with the published ranges, and returns the exit code."""
-    if options.budget == "smoke" or options.telemetry or options.set:
-        tell("Published verdicts are those of the reference on the paper's example at full budget; this run is another one.")
-        return 0
-    if different is None:
-        tell("There is no published range yet, with which the measurements could be compared.")
+    if options.budget == "smoke" or options.set:
+        tell("Published verdicts are those of the reference at full budget; this run is another one.")
         return 0
     for line in different:
         tell(f"outside the published range: {line}")

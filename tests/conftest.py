@@ -16,13 +16,11 @@ if (
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports TensorFlow
+os.environ.setdefault("TF_ENABLE_ONEDNN_OPTS", "1")  # as in `common.backend`, also for tests that import Keras directly
 for threads in ("TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(threads, "1")  # two test processes run at a time, and waiting threads would also use CPU time
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
-from enhsim_tf.common.tensorflow_settings import apply_settings  # noqa: E402
-
-apply_settings()  # tests that import Keras directly use the package's settings
 
 ROOT = Path(__file__).parents[1]
 SLOW = "--slow"

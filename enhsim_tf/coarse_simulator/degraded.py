@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.paper import square_wave
 
 MODES = {
     "stuck": "the mechanism stands still from the onset, for the fraction `severity` of the remaining time",
@@ -16,7 +17,6 @@ MODES = {
     "dropout": "random runs of 10 samples, half of all runs at severity 1, read the lowest level",
     "period_change": "every period is multiplied by 1 + `severity`",
 }
-_DROPOUT_RUN = 10  # samples
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,37 +74,8 @@ def degrade(
     """
     if scenario is None or scenario.severity == 0:
         return signal(time_s)
-    severity, (low, high) = scenario.severity, levels
-    num_windows, num_samples = time_s.shape
-    onset = min(scenario.first_sample(num_samples), num_samples - 1)
-    time_s, late = time_s.copy(), time_s[:, onset:]
-    begin = late[:, :1]
-
-    # modes of the mechanism change the time at which the signal is evaluated
-    if scenario.mode == "stuck":
-        until = begin + severity * (late[:, -1:] - begin)
-        time_s[:, onset:] = np.where(late <= until, begin, late)
-    elif scenario.mode == "period_change":
-        time_s[:, onset:] = begin + (late - begin) / (1 + severity)
-    elif scenario.mode == "friction":
-        knots = np.arange(0, late[0, -1] - late[0, 0] + shortest_period_s, shortest_period_s / 4)
-        lags = rng.uniform(0, severity * shortest_period_s / 4, (num_windows, len(knots)))
-        lags[:, 0] = 0
-        elapsed = late[0] - late[0, 0]
-        time_s[:, onset:] = late - np.stack([np.interp(elapsed, knots, lag) for lag in lags])
-    values = signal(time_s)
-
-    # modes of the sensor change the values
-    after = values[:, onset:]
-    if scenario.mode == "drift":
-        after += severity * (high - low) * np.linspace(0, 1, after.shape[1])
-    elif scenario.mode == "gain_loss":
-        middle = (low + high) / 2
-        after[:] = middle + (1 - severity) * (after - middle)
-    elif scenario.mode == "dropout":
-        runs = rng.random((num_windows, -(-after.shape[1] // _DROPOUT_RUN))) < severity / 2
-        after[np.repeat(runs, _DROPOUT_RUN, axis=1)[:, : after.shape[1]]] = low
-    return values
+    onset = min(scenario.first_sample(time_s.shape[1]), time_s.shape[1] - 1)
+    return square_wave.degrade(signal, time_s, scenario.mode, scenario.severity, levels, shortest_period_s, rng, onset)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -26,19 +26,15 @@ _MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and 
 _KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names reserved by Windows
 
 
-def _beside(path: Path, kind: str, suffix: str = "") -> Path:
-    return path.with_name(f".{path.name}.{kind}.enhsim_tf{suffix}")
-
-
-def _temporary(path: Path, suffix: str = "") -> Path:
-    return _beside(path, uuid.uuid4().hex[:8], suffix)
+def _beside(path: Path, suffix: str = "", kind: str | None = None) -> Path:
+    """The path beside a destination where its new content is written, or its `old` content waits."""
+    return path.with_name(f".{path.name}.{kind or uuid.uuid4().hex[:8]}.enhsim_tf{suffix}")
 
 
 @contextlib.contextmanager
 def _locked(path: Path, blocking: bool = True) -> Iterator[None]:
     """Holds a lock beside a path. The operating system releases it when this process ends for any reason."""
-    lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), blocking=blocking)
-    with lock:
+    with filelock.FileLock(path.with_name(f"{path.name}.lock"), blocking=blocking) as lock:
         try:
             yield
         finally:
@@ -47,16 +43,9 @@ def _locked(path: Path, blocking: bool = True) -> Iterator[None]:
 
 
 def encode_name(name: str) -> str:
-    """Percent-encodes a name, such as a channel's, for use as a file or folder name.
+    """Percent-encodes a name, such as a channel's, for use as a file or folder name; `urllib.parse.unquote` restores it.
 
     The result cannot point outside its folder, is not hidden, and is not a name that Windows reserves.
-    `urllib.parse.unquote` restores the original name.
-
-    Args:
-        name: The name.
-
-    Returns:
-        The encoded name.
 
     Raises:
         InputError: If the name is empty, too long for a file, or not valid Unicode.
@@ -77,13 +66,7 @@ def encode_name(name: str) -> str:
 
 
 def make_folder(path: str | os.PathLike) -> Path:
-    """Creates a folder with its parents.
-
-    Args:
-        path: The folder.
-
-    Returns:
-        The folder as a `Path`.
+    """Creates a folder with its parents, and returns its path.
 
     Raises:
         InputError: If the folder cannot be created or written to.
@@ -91,7 +74,7 @@ def make_folder(path: str | os.PathLike) -> Path:
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = _temporary(path / "probe")
+        probe = _beside(path / "probe")
         probe.touch()
         probe.unlink()
     except OSError as error:
@@ -101,13 +84,9 @@ def make_folder(path: str | os.PathLike) -> Path:
 
 @contextlib.contextmanager
 def replace_file(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a temporary path. If the block succeeds, the file written there replaces `path`; if it fails, `path` stays unchanged.
-
-    Args:
-        path: The file to write.
-    """
+    """Yields a temporary path. If the block succeeds, the file written there replaces `path`; if it fails, `path` stays unchanged."""
     path = Path(path)
-    temporary = _temporary(path, path.suffix)  # some writers choose the format by the suffix
+    temporary = _beside(path, path.suffix)  # some writers choose the format by the suffix
     with _locked(temporary):
         try:
             yield temporary
@@ -117,25 +96,25 @@ def replace_file(path: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None = None) -> Iterator[Path]:
+def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] = lambda path: False) -> Iterator[Path]:
     """Yields a temporary folder. If the block succeeds, that folder replaces `path`; if it fails, `path` stays unchanged.
 
     Args:
         path: The folder to write.
-        keep: Called with `path` before it is replaced. If it returns True, the existing folder is kept and the new one is
-            discarded, so that a process that is reading the existing folder does not lose it.
+        keep: Called with an existing `path` before it is replaced. If it returns True, the new folder is discarded, so that a
+            process that is reading the existing one does not lose it.
     """
     path = Path(path)
     make_folder(path.parent)
     remove_leftovers(path.parent, path.name)
-    temporary, old = _temporary(path), _beside(path, "old")
+    temporary, old = _beside(path), _beside(path, kind="old")
     with _locked(temporary):
         try:
             temporary.mkdir()
             yield temporary
             with _locked(old):
                 _restore(path)
-                if keep is None or not os.path.lexists(path) or not keep(path):
+                if not os.path.lexists(path) or not keep(path):
                     try:
                         if os.path.lexists(path):
                             os.replace(path, old)
@@ -148,7 +127,7 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
 
 def _restore(path: Path) -> None:
     """Brings the old content back if there is no new content, and otherwise removes it."""
-    old = _beside(path, "old")
+    old = _beside(path, kind="old")
     if os.path.lexists(path):
         _remove(old)
     elif os.path.lexists(old):
@@ -163,7 +142,7 @@ def _remove(path: Path) -> None:
 
 
 def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None:
-    """Removes what killed processes left, and restores old content that they had only moved aside.
+    """Removes what killed processes left in a folder, and restores old content that they had only moved aside.
 
     Args:
         folder: The folder in which `replace_folder` or `replace_file` was writing.
@@ -182,12 +161,7 @@ def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None
 
 
 def write_json(path: str | os.PathLike, content: Any) -> None:
-    """Writes `content` atomically as indented JSON.
-
-    Args:
-        path: The file.
-        content: Anything that JSON can express, without NaN and infinity.
-    """
+    """Writes `content` atomically as indented JSON, which has neither NaN nor infinity."""
     with replace_file(path) as temporary:
         temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 

@@ -1,18 +1,26 @@
 """Starts TensorFlow for the networks of sections 2.2 and 2.3: `from enhsim_tf.common.backend import keras, tf`.
 
 Every module with a network imports Keras and TensorFlow from here. Commands, worker processes, notebooks and programs that
-use the package as a library therefore share the same settings (see `tensorflow_settings`), and TensorFlow's start-up
-messages are suppressed. If TensorFlow was imported earlier, it keeps the settings with which it started.
+use the package as a library therefore share the same settings, and TensorFlow's start-up messages are suppressed. If TensorFlow
+was imported earlier, it keeps the settings with which it started. Variables that the user has set keep their values, see
+`docs/speed.md`.
 """
 
 import contextlib
-import gc
 import os
 import sys
 from collections.abc import Iterator
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.tensorflow_settings import SETTINGS, apply_settings
+
+SETTINGS = {
+    "TF_ENABLE_ONEDNN_OPTS": "1",  # without AVX-512, TensorFlow's default is its own kernels, which take up to three times as long
+    "TF_CPP_MIN_LOG_LEVEL": "2",
+    "KERAS_BACKEND": "tensorflow",
+}
+"""Environment variables, and the values that they receive if the user has not set them. Child processes inherit them."""
+_ALLOCATOR = ("MALLOC_", "GLIBC_TUNABLES")  # prefixes of the variables that configure the memory allocator of glibc
+_M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # parameters of glibc's mallopt
 
 
 @contextlib.contextmanager
@@ -29,22 +37,27 @@ def _standard_error_silenced() -> Iterator[None]:
         os.close(nowhere)
 
 
-@contextlib.contextmanager
-def _garbage_collection_paused() -> Iterator[None]:
-    """Pauses the garbage collector, which would repeatedly traverse the imported objects although none of them is garbage."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
+def _keep_freed_memory() -> None:
+    """Configures glibc to keep memory that was freed, unless the user has configured it.
+
+    By default, it returns every block above 32 MB to the operating system, which then has to clear the same pages again for each
+    gradient of the enhancer's widest layer.
+    """
+    if not sys.platform.startswith("linux") or any(name.startswith(_ALLOCATOR) for name in os.environ):
+        return
+    import ctypes
+
+    library = ctypes.CDLL(None)
+    if hasattr(library, "gnu_get_libc_version"):  # another C library, such as musl, lacks these settings
+        library.mallopt(_M_MMAP_MAX, 0)
+        library.mallopt(_M_TRIM_THRESHOLD, 2**31 - 1)
 
 
 def _start() -> None:
-    apply_settings()
+    os.environ |= {name: value for name, value in SETTINGS.items() if not os.environ.get(name)}
+    _keep_freed_memory()
     _check_backend("Expected KERAS_BACKEND", os.environ["KERAS_BACKEND"])
-    with _standard_error_silenced(), _garbage_collection_paused():
+    with _standard_error_silenced():
         import tensorflow
 
         tensorflow.config.list_physical_devices()  # the first call prints messages about devices

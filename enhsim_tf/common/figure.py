@@ -13,8 +13,6 @@ import numpy as np
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.plot_style import EDGE, GENERATED, QUIET, STYLE
 
-WATERMARK = "SMOKE BUDGET"
-
 
 @dataclasses.dataclass(frozen=True)
 class Figure:
@@ -33,11 +31,7 @@ class Figure:
     drawn_by: Callable[[Mapping[str, np.ndarray]], matplotlib.figure.Figure]
 
     def draw(self, data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
-        """Draws the figure in the common style.
-
-        Args:
-            data: The arrays that it shows.
-        """
+        """Draws the figure of its arrays in the common style."""
         with matplotlib.style.context(STYLE):
             return self.drawn_by(data)
 
@@ -52,16 +46,14 @@ def save(
     *,
     figures: Mapping[str, Figure],
 ) -> list[Path]:
-    """Draws a figure and writes it with its caption line, and with a watermark if it comes from a smoke run.
-
-    The same data give the same bytes.
+    """Draws a figure and writes it with its caption line. The same data give the same bytes.
 
     Args:
         name: One of `figures`.
         data: Its arrays.
         folder: An existing folder.
         caption: Caption line, printed at the bottom.
-        is_smoke: Whether the arrays come from a smoke run.
+        is_smoke: Whether the arrays come from a smoke run, which a watermark then says.
         saved_as: File types.
         figures: The figures by name.
 
@@ -75,7 +67,7 @@ def save(
     figure.text(EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
     if is_smoke:
         mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
-        figure.text(0.5, 0.5, WATERMARK, **mark, ha="center", va="center", zorder=10, gid="watermark")
+        figure.text(0.5, 0.5, "SMOKE BUDGET", **mark, ha="center", va="center", zorder=10, gid="watermark")
     paths = [Path(folder) / f"{name}.{kind}" for kind in saved_as]
     with matplotlib.style.context(STYLE):
         for path in paths:

@@ -18,23 +18,17 @@ REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#
 QUIET, LINE = "#595959", "#8c8c8c"  # secondary text; outlines
 IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker colours for text that names a curve
 DASHED = (0, (4, 2))  # line style of the second curve of a panel
-BLUE_TINT, ORANGE_TINT, GREY_TINT = "#e4eff7", "#fdeadd", "#f3f3f3"
+GREY_TINT = "#f3f3f3"
 SINGLE, DOUBLE = 3.5, 7.2  # widths of one and two journal columns, in inches
 FOOT = 0.26  # free space for the caption line at the bottom of each figure, in inches
 EDGE = 0.10  # distance from the edges of the figure to its text, in inches
 
 
 def new_sheet(width: float, height: float, title: str, subtitle: str = "") -> tuple[matplotlib.figure.Figure, float]:
-    """Creates an empty figure with a title and a subtitle.
-
-    Args:
-        width: Width in inches.
-        height: Height in inches.
-        title: The main message, wrapped to the width.
-        subtitle: A qualification of the message, wrapped to the width.
+    """Creates an empty figure with a title, the main message, and a subtitle that qualifies it.
 
     Returns:
-        The figure, and the height of the heading in inches.
+        The figure, and the height of the heading; all lengths are in inches.
     """
     figure = matplotlib.figure.Figure(figsize=(width, height))
     down = 0.10
@@ -60,11 +54,11 @@ def panels(
 
     Args:
         figure: The figure.
-        down: Distance from the top of the figure to the grid, in inches.
+        down: Distance from the top of the figure to the grid, in inches, as are `right` and `gap`.
         rows: Number of rows.
         columns: Number of columns.
-        right: Distance from the grid to the right edge of the figure, in inches.
-        gap: Distance between rows and between columns, in inches.
+        right: Distance from the grid to the right edge of the figure.
+        gap: Distance between rows and between columns.
         height_ratios: Relative heights of the rows.
         **shared: `sharex` and `sharey` of `Figure.subplots`.
 
@@ -94,25 +88,13 @@ def name_axes(axes: np.ndarray, data: Mapping[str, Any]) -> None:
 
 
 def beside(axes: Axes, height: float, text: str, color: str) -> None:
-    """Puts a label to the right of the axes.
-
-    Args:
-        axes: The axes.
-        height: Vertical position, from 0 at the bottom of the axes to 1 at the top.
-        text: The label.
-        color: Colour of the curve that is labelled. The label may be darker.
-    """
+    """Puts a label to the right of the axes, at a height from 0 to 1 of them, in the colour of its curve or darker."""
     style = {"color": IN_PRINT.get(color, color), "va": "center", "linespacing": 1.05, "annotation_clip": False}
     axes.annotate(text, (1, height), (5, 0), "axes fraction", "offset points", **style)
 
 
 def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
-    """Labels the right ends of curves, moving labels apart where they would overlap.
-
-    Args:
-        axes: The axes.
-        curves: For each label, the values of the curve (or its height at the right end) and its colour.
-    """
+    """Labels the right ends of curves, given for each label as values and colour, and moves labels apart that would overlap."""
     low, high = axes.get_ylim()
     inches = axes.get_position().height * axes.figure.get_size_inches()[1]
     ends = sorted((float(np.ravel(values)[-1]), name, color) for name, (values, color) in curves.items())
@@ -127,12 +109,7 @@ def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
 
 
 def title_words(axes: Axes, words: Sequence[tuple[str, str]]) -> None:
-    """Writes a title in which each word has the colour of the curve that it names.
-
-    Args:
-        axes: The axes.
-        words: Pairs of word and colour.
-    """
+    """Writes a title of pairs of word and colour: each word has the colour of the curve that it names."""
     width, place = axes.get_position().width * axes.figure.get_size_inches()[0], 0.0
     for word, color in words:
         style = {"color": IN_PRINT.get(color, color), "weight": "bold", "annotation_clip": False}

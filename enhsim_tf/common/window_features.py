@@ -11,17 +11,11 @@ which a classifier tells quantised noise from itself."""
 
 
 def window_features(windows: np.ndarray) -> np.ndarray:
-    """Computes fourteen features of each window. Values far below 1e-6 have to be given in a larger unit.
+    """Computes fourteen features of windows of shape `(windows, samples)`. Values far below 1e-6 have to be given in a larger unit.
 
-    The features are the mean, the logarithm of the standard deviation, the excess kurtosis, the maximum, the logarithm of the
+    They are the mean, the logarithm of the standard deviation, the excess kurtosis, the maximum, the logarithm of the
     standard deviation of the first differences, the autocorrelation at lag 1, and the logarithm of the power in eight
     frequency bands whose edges are spaced evenly on a logarithmic scale. Very short windows have fewer bands.
-
-    Args:
-        windows: Windows of shape `(windows, samples)`.
-
-    Returns:
-        float64 array of shape `(windows, 14)`.
     """
     values = np.asarray(windows, np.float64)
     tiny = 1e-12  # keeps logarithms and quotients of constant windows finite
@@ -39,31 +33,16 @@ def window_features(windows: np.ndarray) -> np.ndarray:
 
 
 def signal_edges(signal_windows: np.ndarray) -> np.ndarray:
-    """Computes where `signal_features` divides the levels and the slopes of a signal into thirds.
-
-    Args:
-        signal_windows: Windows of shape `(windows, samples)`, of at least 2 samples.
-
-    Returns:
-        float64 array of shape `(2, 2)`: both edges of the levels, and both edges of the slopes.
-    """
+    """Where `signal_features` divides a signal's levels, and its slopes, into thirds: both edges of each, shape `(2, 2)`."""
     values = np.asarray(signal_windows, np.float64)
     return np.stack([np.quantile(each, (1 / 3, 2 / 3)) for each in (values, np.gradient(values, axis=1))])
 
 
 def signal_features(noise_windows: np.ndarray, signal_windows: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Computes twelve features of noise and the signal below it.
+    """Computes twelve features of noise and the signal below it, of windows of the same shape, given the result of `signal_edges`.
 
     The features are the mean of the noise and the logarithm of its root mean square, each where the signal is low, medium and
     high, and where it falls, is flat and rises. Where a window has no such samples, they are those of the whole window.
-
-    Args:
-        noise_windows: Windows of shape `(windows, samples)`.
-        signal_windows: The signal, of the same shape.
-        edges: As returned by `signal_edges`.
-
-    Returns:
-        float64 array of shape `(windows, 12)`.
     """
     noise, signal = np.asarray(noise_windows, np.float64), np.asarray(signal_windows, np.float64)
     columns = []

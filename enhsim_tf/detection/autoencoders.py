@@ -3,8 +3,6 @@
 Keras is imported only when a detector is trained.
 """
 
-from typing import Any
-
 import numpy as np
 
 from enhsim_tf.detection.detectors import flat
@@ -13,7 +11,7 @@ from enhsim_tf.detection.detectors import flat
 class _Autoencoder:
     """Scores windows by the mean squared reconstruction error of a network that `_build` makes."""
 
-    training: dict[str, Any]
+    learning_rate = 0.001
 
     def fit(self, windows: np.ndarray) -> "_Autoencoder":
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
@@ -22,7 +20,7 @@ class _Autoencoder:
         windows = flat(windows)
         self._mean, self._scale = np.mean(windows), np.std(windows)
         self._network, scaled = self._build(windows.shape[1]), self._scaled(windows)
-        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, verbose=0, **self.training)
+        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, learning_rate=self.learning_rate)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -41,8 +39,6 @@ class DenseAutoencoder(_Autoencoder):
         epochs: Number of training epochs.
         seed: Seed for the initial weights and for the shuffling of the windows.
     """
-
-    training = {"jit_compile": False}
 
     def __init__(self, epochs: int = 30, seed: int = 0):
         self.epochs, self.seed = epochs, seed
@@ -66,7 +62,7 @@ class ConvolutionalAutoencoder(_Autoencoder):
         seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
-    training = {"learning_rate": 0.003}
+    learning_rate = 0.003
 
     def __init__(self, epochs: int = 15, seed: int = 0):
         self.epochs, self.seed = epochs, seed

@@ -207,7 +207,7 @@ def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> Laye
     outputs = wanted.shape[1]
     network = dense_stack(rows.shape[1], (outputs, _PAPER_UNITS, _PAPER_UNITS, outputs), seed, "enhancer")
     falling = keras.optimizers.schedules.CosineDecay(_PAPER_RATE, epochs * -(-len(rows) // _BATCH_SIZE))
-    fit_windows(network, rows, wanted, epochs, _BATCH_SIZE, seed, falling, verbose=0)
+    fit_windows(network, rows, wanted, epochs, _BATCH_SIZE, seed, falling)
     return [tuple(layer.get_weights()) for layer in network.layers]
 
 

@@ -52,11 +52,6 @@ DETECTORS = {"PCA residual": pca_residual, "isolation forest": isolation_forest,
 
 
 def threshold(scores: np.ndarray, rate: float) -> float:
-    """The split conformal threshold: the score of rank `ceil((n + 1) (1 - rate))` among `n` held-out nominal scores.
-
-    Args:
-        scores: Scores of held-out windows of the training data's kind.
-        rate: False-alarm rate on such windows.
-    """
+    """The split conformal threshold for a rate of false alarms: the score of rank `ceil((n + 1) (1 - rate))` among `n` held-out ones."""
     rank = int(np.ceil((len(scores) + 1) * (1 - rate) - 1e-9))
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else float(np.max(scores))

@@ -8,19 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.backend import keras
-from enhsim_tf.common.blockwise_training import BlockwiseTraining, is_wide_dense_stack
-from enhsim_tf.common.fused_adam import fused_adam
+from enhsim_tf.common.fast_keras import BlockwiseTraining, fused_adam, is_wide_dense_stack
 from enhsim_tf.paper.settings import Settings
 
 
 def initialiser(settings: Settings, of_author: str, number: int) -> keras.initializers.Initializer:
-    """The seeded initialiser of one layer.
-
-    Args:
-        settings: `initialisers` says whether each layer has the one that the author gives it, or all have he_uniform.
-        of_author: The author's initialiser of the layer.
-        number: A number that no other layer has.
-    """
+    """The initialiser of one layer: the author's, or he_uniform if all layers have that; no other layer has the same number."""
     name = of_author if settings.initialisers == "by layer" else settings.initialisers
     return type(keras.initializers.get(name))(seed=1_000 * settings.seed + number)
 
@@ -44,14 +37,7 @@ def build_enhancer(settings: Settings) -> keras.Sequential:
 
 
 class Pairs(keras.utils.PyDataset):
-    """Batches of source and target windows, which a generator of its own shuffles before each epoch.
-
-    Args:
-        source: Source windows, float32 of shape `(windows, samples)`.
-        target: Target windows of the same shape.
-        batch_size: Windows in a batch.
-        rng: Random generator.
-    """
+    """Batches of source windows and their targets, float32 of shape `(windows, samples)`; `rng` shuffles them before each epoch."""
 
     def __init__(self, source: np.ndarray, target: np.ndarray, batch_size: int, rng: np.random.Generator):
         super().__init__()
@@ -106,15 +92,7 @@ def train_enhancer(
 
 
 def enhance(network: keras.Sequential, coarse: np.ndarray) -> np.ndarray:
-    """Step 5: converts "simulation to accurate, clean data".
-
-    Args:
-        network: The trained enhancer.
-        coarse: Coarse windows, shape `(windows, window)`.
-
-    Returns:
-        float32 array of the same shape.
-    """
+    """Step 5: converts "simulation to accurate, clean data", windows of shape `(windows, window)`, by the trained enhancer."""
     return predict(network, np.asarray(coarse, np.float32))
 
 

@@ -1,12 +1,13 @@
 """Figures 1 to 14 of the paper; the fourteenth is commented out in its source.
 
-Each function draws one figure from a pipeline, which trains what the figure needs. Figures 1 and 11 are drawings that are kept beside
-this file. Figures 5 to 7, faces of another system's making in the paper, have counterparts: real and generated windows in random order.
+Each function draws one figure from a pipeline, which trains what the figure needs; its docstring is the figure's text alternative, for
+readers who cannot see it. Figures 1 and 11 are drawings that are kept beside this file. Figures 5 to 7, faces of another system's making
+in the paper, have counterparts: real and generated windows in random order.
 """
 
 import dataclasses
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib.dates
@@ -48,14 +49,50 @@ COUNTERPART = "A counterpart of a face in the paper, which another system made."
 FACTS = {"time_unit": "min", "unit": "dimensionless"}  # of all axes that show windows
 
 
+@dataclasses.dataclass(frozen=True)
+class PaperFigure(Figure):
+    """A figure of the paper, which `drawn_by` draws from a pipeline; None for a drawing that is kept.
+
+    Args:
+        needs_training: Whether it shows a trained network.
+    """
+
+    needs_training: bool = True
+
+
+FIGURES: dict[str, PaperFigure] = {
+    "fig01_pipeline": PaperFigure(
+        1,
+        "Enhanced simulation pipeline",
+        "Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector through the generator to noise; their "
+        "sum is the final output beside real telemetry. Telemetry trains the enhancer, and its noise trains the GAN.",
+        None,
+        needs_training=False,
+    )
+}
+"""All figures by name; `paper_figure` adds those that a function draws."""
+Draw = Callable[[Pipeline], matplotlib.figure.Figure]
+
+
+def paper_figure(name: str, title: str, needs_training: bool = False) -> Callable[[Draw], Draw]:
+    """Makes a function that draws a figure one of `FIGURES`."""
+
+    def add(draw: Draw) -> Draw:
+        FIGURES[name] = PaperFigure(int(name[3:5]), title, " ".join(draw.__doc__.split()), draw, needs_training)
+        return draw
+
+    return add
+
+
 def sample(pipeline: Pipeline, part: str, number: int, purpose: str) -> dict[str, np.ndarray]:
     """Some windows of a part, and the minutes since the beginning of each as `minutes`."""
     drawn = pipeline.windows(part, number, purpose)
     return drawn | {"minutes": pipeline.telemetry.interval / 60 * np.arange(pipeline.settings.window)}
 
 
+@paper_figure("fig02_source_target", "Training source and target time series")
 def training_pairs(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 2."""
+    """Three training windows: above the coarse simulation, a sum of square waves, below the telemetry of the same time."""
     pairs = sample(pipeline, "train", 3, "figure 2")
     figure, down = new_sheet(DOUBLE, 3.1, "Training source and target of the same times", "Windows begin at random times.")
     axes = panels(figure, down + 0.2, 2, 3, sharex=True, sharey=True)
@@ -70,8 +107,15 @@ def training_pairs(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return figure
 
 
+@paper_figure("fig03_enhancer", "Enhancing MLP neural network")
+def enhancer_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Table of the enhancer's layers with their output shapes and numbers of parameters."""
+    return layer_table(build_enhancer(pipeline.settings), "Layers of the enhancer")
+
+
+@paper_figure("fig04_enhanced_simulation", "Enhanced simulation", needs_training=True)
 def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 4."""
+    """A held-out window: the stepped simulation, the enhanced signal and the true signal; below, the difference of the last two."""
     window = sample(pipeline, "test", 1, "figure 4")
     enhanced, truth = pipeline.enhance(window["coarse"])[0], window["truth"][0]
     errors = measured("enhancement", pipeline)
@@ -86,11 +130,10 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     above.plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
     above.plot(window["minutes"], enhanced, color=ENHANCED, linewidth=1.4)
     above.plot(window["minutes"], truth, color=REAL, linewidth=0.8, linestyle=DASHED)
-    name = "true signal" if pipeline.truth else "telemetry"
-    label_ends(above, {"coarse": (window["coarse"][0], COARSE), "enhanced": (enhanced, ENHANCED), name: (truth, REAL)})
+    label_ends(above, {"coarse": (window["coarse"][0], COARSE), "enhanced": (enhanced, ENHANCED), "true signal": (truth, REAL)})
     below.axhline(0, color=LINE, linewidth=0.6)
     below.plot(window["minutes"], enhanced - truth, color=ENHANCED, linewidth=0.8)
-    beside(below, 0.5, f"enhanced\n− {name}", ENHANCED)
+    beside(below, 0.5, "enhanced\n− true signal", ENHANCED)
     name_axes(np.array([[above], [below]]), FACTS)
     return figure
 
@@ -115,23 +158,26 @@ def guess(
     return figure
 
 
+@paper_figure("fig05_real_or_generated", "Real or generated: windows of telemetry (a counterpart)", needs_training=True)
 def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 5, a counterpart."""
+    """Eight windows of telemetry in random order; four are generated."""
     rng, real = pipeline.draw("figure 5"), sample(pipeline, "test", 4, "figure 5, real")
     generated = pipeline.combine(pipeline.windows("test", 4, "figure 5, generated")["coarse"], rng)
     return guess("Which windows of telemetry are generated?", real["minutes"], real["target"], generated, rng)
 
 
+@paper_figure("fig06_real_or_generated_noise", "Real or generated: windows of noise (a counterpart)", needs_training=True)
 def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 6, a counterpart."""
+    """Eight windows of noise in random order; four are generated."""
     rng, found = pipeline.draw("figure 6"), measured("noise resemblance", pipeline)
     real, minutes = pipeline.noise_windows("test", 4, "figure 6, real"), sample(pipeline, "test", 1, "figure 6")["minutes"]
     hint = f"effective rank: generated {found['rank']:.0f}, real {found['real_rank']:.0f}"
     return guess("Which windows of noise are generated?", minutes, real, pipeline.generate_noise(4, rng), rng, hint)
 
 
+@paper_figure("fig07_real_or_generated_series", "Real or generated: longer series (a counterpart)", needs_training=True)
 def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 7, a counterpart: four windows in a row, or as many as there are, so that repetition shows."""
+    """Four longer series in random order; two are generated."""
     rng, size = pipeline.draw("figure 7"), pipeline.settings.window
     series = pipeline.parts["test"]
     number = min(4, len(series.values) // size)
@@ -142,8 +188,9 @@ def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return guess("Which longer series are generated?", minutes, series.values[starts[:2]], clean + noise, rng, columns=1)
 
 
+@paper_figure("fig08_source_noise", "Extracted source noise")
 def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 8."""
+    """Above a window of telemetry with its moving average, below the noise that remains."""
     settings, window = pipeline.settings, sample(pipeline, "test", 1, "figure 8")
     series, start = pipeline.parts["test"].values, int(window["start"][0])
     before = settings.moving_average // (2 if settings.average == "centred" else 1)
@@ -167,8 +214,31 @@ def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return figure
 
 
+@paper_figure("fig09_generator", "Generator construction")
+def generator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Table of the generator's layers with their output shapes and numbers of parameters."""
+    return layer_table(build_generator(pipeline.settings), "Layers of the generator")
+
+
+@paper_figure("fig10_discriminator", "Discriminator construction")
+def discriminator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Table of the discriminator's layers with their output shapes and numbers of parameters."""
+    return layer_table(build_discriminator(pipeline.settings), "Layers of the discriminator")
+
+
+FIGURES["fig11_gan_training"] = PaperFigure(
+    11,
+    "GAN training",
+    "Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and generated rows, labelled 0. Then the "
+    "generator learns through the frozen discriminator, with the label reversed to 1.",
+    None,
+    needs_training=False,
+)
+
+
+@paper_figure("fig12_accuracy_loss", "Accuracy and loss for real and fake classifications", needs_training=True)
 def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 12."""
+    """Accuracy and loss of the discriminator on real and on generated rows over the iterations, beside chance."""
     history, last = pipeline.history, pipeline.settings.iterations
     chosen = history["iteration"] <= last
     figure, down = new_sheet(
@@ -192,8 +262,9 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return figure
 
 
+@paper_figure("fig13_combined", "Simulator output, enhanced, with noise added", needs_training=True)
 def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 13."""
+    """The stepped simulation with the enhanced signal, the enhanced signal with generated noise, and real telemetry of the same time."""
     window, rng = sample(pipeline, "test", 1, "figure 13"), pipeline.draw("figure 13, noise")
     enhanced = pipeline.enhance(window["coarse"])
     noisy = enhanced + pipeline.generate_noise(1, rng)
@@ -216,8 +287,9 @@ def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return figure
 
 
+@paper_figure("fig14_telemetry_store", "Example telemetry signals in the store")
 def stored_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 14."""
+    """The first samples of the stored telemetry over time."""
     telemetry = pipeline.telemetry
     shown = telemetry.part(0, min(4 * pipeline.settings.window, len(telemetry.values)))
     start = np.datetime64(telemetry.start.removesuffix("Z"), "ms")
@@ -237,7 +309,7 @@ def stored_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 
 def layer_table(network: keras.Sequential, title: str) -> matplotlib.figure.Figure:
-    """Figures 3, 9 and 10: the layers of a network with their output shapes and numbers of parameters."""
+    """The layers of a network with their output shapes and numbers of parameters."""
     height = 0.9 + 0.3 * (len(network.layers) + 1) + FOOT
     figure, down = new_sheet(SINGLE, height, title)
     axes = figure.add_axes((0, 0, 1, 1), xlim=(0, SINGLE), ylim=(0, height))
@@ -277,119 +349,8 @@ def layer_details(layer: keras.layers.Layer) -> str:
     return ", ".join([*words, *([config["activation"]] if config.get("activation") else [])])
 
 
-@dataclasses.dataclass(frozen=True)
-class PaperFigure(Figure):
-    """A figure of the paper, which `drawn_by` draws from a pipeline; None for a drawing that is kept.
-
-    Args:
-        needs_training: Whether it shows a trained network.
-    """
-
-    needs_training: bool = True
-
-
-FIGURES = {
-    "fig01_pipeline": PaperFigure(
-        1,
-        "Enhanced simulation pipeline",
-        "Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector through the generator to noise; their "
-        "sum is the final output beside real telemetry. Telemetry trains the enhancer, and its noise trains the GAN.",
-        None,
-        needs_training=False,
-    ),
-    "fig02_source_target": PaperFigure(
-        2,
-        "Training source and target time series",
-        "Three training windows: above the coarse simulation, a sum of square waves, below the telemetry of the same time.",
-        training_pairs,
-        needs_training=False,
-    ),
-    "fig03_enhancer": PaperFigure(
-        3,
-        "Enhancing MLP neural network",
-        "Table of the enhancer's layers with their output shapes and numbers of parameters.",
-        lambda pipeline: layer_table(build_enhancer(pipeline.settings), "Layers of the enhancer"),
-        needs_training=False,
-    ),
-    "fig04_enhanced_simulation": PaperFigure(
-        4,
-        "Enhanced simulation",
-        "A held-out window: the stepped simulation, the enhanced signal and the true signal; below, the difference of the last two.",
-        enhanced_simulation,
-    ),
-    "fig05_real_or_generated": PaperFigure(
-        5,
-        "Real or generated: windows of telemetry (a counterpart)",
-        "Eight windows of telemetry in random order; four are generated.",
-        guess_telemetry,
-    ),
-    "fig06_real_or_generated_noise": PaperFigure(
-        6, "Real or generated: windows of noise (a counterpart)", "Eight windows of noise in random order; four are generated.", guess_noise
-    ),
-    "fig07_real_or_generated_series": PaperFigure(
-        7, "Real or generated: longer series (a counterpart)", "Four longer series in random order; two are generated.", guess_series
-    ),
-    "fig08_source_noise": PaperFigure(
-        8,
-        "Extracted source noise",
-        "Above a window of telemetry with its moving average, below the noise that remains.",
-        source_noise,
-        needs_training=False,
-    ),
-    "fig09_generator": PaperFigure(
-        9,
-        "Generator construction",
-        "Table of the generator's layers with their output shapes and numbers of parameters.",
-        lambda pipeline: layer_table(build_generator(pipeline.settings), "Layers of the generator"),
-        needs_training=False,
-    ),
-    "fig10_discriminator": PaperFigure(
-        10,
-        "Discriminator construction",
-        "Table of the discriminator's layers with their output shapes and numbers of parameters.",
-        lambda pipeline: layer_table(build_discriminator(pipeline.settings), "Layers of the discriminator"),
-        needs_training=False,
-    ),
-    "fig11_gan_training": PaperFigure(
-        11,
-        "GAN training",
-        "Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and generated rows, labelled 0. Then the "
-        "generator learns through the frozen discriminator, with the label reversed to 1.",
-        None,
-        needs_training=False,
-    ),
-    "fig12_accuracy_loss": PaperFigure(
-        12,
-        "Accuracy and loss for real and fake classifications",
-        "Accuracy and loss of the discriminator on real and on generated rows over the iterations, beside chance.",
-        accuracy_and_loss,
-    ),
-    "fig13_combined": PaperFigure(
-        13,
-        "Simulator output, enhanced, with noise added",
-        "The stepped simulation with the enhanced signal, the enhanced signal with generated noise, and real telemetry of the same time.",
-        combined,
-    ),
-    "fig14_telemetry_store": PaperFigure(
-        14,
-        "Example telemetry signals in the store",
-        "The first samples of the stored telemetry over time.",
-        stored_telemetry,
-        needs_training=False,
-    ),
-}
-
-
 def save_figure(name: str, pipeline: Pipeline, folder: Path, caption: str, is_smoke: bool = False) -> None:
-    """Writes a figure as PNG and SVG. The same results give the same bytes.
-
-    Args:
-        name: One of `FIGURES`.
-        pipeline: What it shows.
-        folder: An existing folder.
-        caption: A line at the foot: what was run.
-        is_smoke: Whether to mark it as the result of a smoke run.
-    """
+    """Writes one of `FIGURES` as PNG and SVG; see `common.figure.save`."""
     if FIGURES[name].drawn_by is not None:
         save(name, pipeline, folder, caption, is_smoke, figures=FIGURES)
         return

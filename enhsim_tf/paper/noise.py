@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.backend import keras, tf
-from enhsim_tf.common.convolution_maximum import with_fast_convolution
-from enhsim_tf.common.fused_adam import fused_adam
+from enhsim_tf.common.fast_keras import fused_adam, with_fast_convolution
 from enhsim_tf.paper.enhancer import initialiser, predict
 from enhsim_tf.paper.settings import Settings
 
@@ -193,14 +192,7 @@ def labels(number: int, tag: float) -> tf.Tensor:
 
 
 class Rows(keras.utils.PyDataset):
-    """Batches of rows that are drawn at random from all real rows, without an end.
-
-    Args:
-        noise: All real rows, float32 of shape `(rows, window)`.
-        batch_size: Rows in a batch.
-        steps: Batches in an epoch.
-        rng: Random generator.
-    """
+    """Batches of rows, `steps` in an epoch, that are drawn at random from all real rows, float32 of shape `(rows, window)`."""
 
     def __init__(self, noise: np.ndarray, batch_size: int, steps: int, rng: np.random.Generator):
         super().__init__()
@@ -243,16 +235,6 @@ def train_gan(
 
 
 def generate_noise(generator: keras.Model, number: int, settings: Settings, rng: np.random.Generator) -> np.ndarray:
-    """Step 9: generates "environmental influences".
-
-    Args:
-        generator: The trained generator.
-        number: Number of windows.
-        settings: All settings.
-        rng: Draws the latent vectors.
-
-    Returns:
-        float32 array of shape `(number, window)`.
-    """
+    """Step 9: generates "environmental influences", float32 of shape `(number, window)`; `rng` draws the latent vectors."""
     latent = settings.latent_scale * rng.standard_normal((number, settings.latent), np.float32)
     return predict(generator, latent.astype(np.float32))[:, :, 0]

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.common.backend import keras
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.measures import autocorrelation
 from enhsim_tf.common.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.paper import noise, square_wave
@@ -35,28 +34,19 @@ FOLLOWED = 200  # generated windows whose statistics are followed in training
 
 
 class Pipeline:
-    """The paper's pipeline on its example, or on telemetry of one's own.
+    """The paper's pipeline on its example.
 
     Args:
         settings: All settings.
         stages: Keeps the results.
         store: Where the telemetry is placed and read back from; None for a Parquet file in the cache.
-        own: Telemetry of one's own instead of the example's, scaled so that its square wave has an amplitude of about 1.
-        own_simulator: Its simulation as a function of time.
     """
 
-    def __init__(
-        self,
-        settings: Settings,
-        stages: Stages,
-        store: Store | None = None,
-        own: Telemetry | None = None,
-        own_simulator: square_wave.Signal | None = None,
-    ):
-        self.settings, self.stages, self.store, self.own = settings, stages, store, own
+    def __init__(self, settings: Settings, stages: Stages, store: Store | None = None):
+        self.settings, self.stages, self.store = settings, stages, store
         # 1: construct lightweight, high-speed simulations
-        self.simulator = own_simulator or square_wave.simulator(settings)
-        self.truth = None if own else true_signal(settings)
+        self.simulator = square_wave.simulator(settings)
+        self.truth = true_signal(settings)
         self._measured: dict[str, dict[str, float]] = {}
 
     def draw(self, purpose: str) -> np.random.Generator:
@@ -68,10 +58,7 @@ class Pipeline:
     @functools.cached_property
     def telemetry(self) -> Telemetry:
         """The telemetry, read back from the store."""
-        depends = self.settings.of("telemetry")
-        if self.own:
-            depends = {"name": self.own.name, "checksum": zlib.crc32(self.own.values.tobytes()), "interval": self.own.interval}
-        folder = self.stages.run("telemetry", self._make_telemetry, depends, version=VERSION["telemetry"])
+        folder = self.stages.run("telemetry", self._make_telemetry, self.settings.of("telemetry"), version=VERSION["telemetry"])
         kept = ParquetStore(folder / "telemetry.parquet")
         if self.store is None:
             return kept.read()
@@ -79,8 +66,7 @@ class Pipeline:
         return self.store.read()
 
     def _make_telemetry(self, folder: Path) -> None:
-        telemetry = self.own or make_telemetry(self.settings, self.draw("telemetry"))
-        ParquetStore(folder / "telemetry.parquet").write(telemetry)
+        ParquetStore(folder / "telemetry.parquet").write(make_telemetry(self.settings, self.draw("telemetry")))
 
     @functools.cached_property
     def parts(self) -> dict[str, Telemetry]:
@@ -98,14 +84,14 @@ class Pipeline:
             purpose: Name of the random draw.
 
         Returns:
-            `coarse`, `target` (the telemetry) and `truth` (the signal without noise, or the telemetry where that is unknown), float32 of
-            shape `(windows, window)`, and `start` of shape `(windows,)`.
+            `coarse`, `target` (the telemetry) and `truth` (the signal without noise), float32 of shape `(windows, window)`, and `start`
+            of shape `(windows,)`.
         """
         series, size = self.parts[part], self.settings.window
         starts = self._starts(len(series.values), number, purpose)
         times, target = (cut_windows(values, starts, size) for values in (series.time, series.values))
-        truth = target if self.truth is None else self.truth(times).astype(np.float32)
-        return {"coarse": self.simulator(times).astype(np.float32), "target": target, "truth": truth, "start": starts}
+        coarse, truth = (signal(times).astype(np.float32) for signal in (self.simulator, self.truth))
+        return {"coarse": coarse, "target": target, "truth": truth, "start": starts}
 
     def _starts(self, num_samples: int, number: int | None, purpose: str) -> np.ndarray:
         if number is None:
@@ -149,19 +135,6 @@ class Pipeline:
         extracted, _ = noise.extract_noise(self.parts[part].values, self.settings.moving_average, self.settings.average)
         return cut_windows(extracted, self._starts(len(extracted), number, purpose), self.settings.window)
 
-    @functools.cached_property
-    def noise_unit(self) -> float:
-        """The unit of the noise in the GAN: 1 for the example; for other telemetry such that its standard deviation is 0.1 there."""
-        if self.own is None:
-            return 1.0
-        sd = {name: float(np.std(self.noise_windows(name), dtype=np.float64)) for name in self.parts}
-        for name, part in self.parts.items():
-            if not sd[name] > 1e-5 * np.std(part.values, dtype=np.float64):  # 32-bit telemetry resolves no less
-                raise InputError(
-                    f"Expected noise around the moving average of {self.own.name}. Received: none in its {name} part. Choose another channel."
-                )
-        return 10 * sd["train"]
-
     # -- 7 and 8: latent space; train generative adversarial model (GAN) -----------------------------------------------
 
     @functools.cached_property
@@ -172,8 +145,8 @@ class Pipeline:
         return self.stages.run("noise GAN", self._train_gan, depends, ["telemetry"], VERSION["noise GAN"])
 
     def _train_gan(self, folder: Path) -> None:
-        chosen, unit = self.settings, np.float32(self.noise_unit)
-        real = self.noise_windows("train", chosen.num_windows, "noise windows") / unit
+        chosen = self.settings
+        real = self.noise_windows("train", chosen.num_windows, "noise windows")
         networks = noise.build_generator(chosen), noise.build_discriminator(chosen)
         gan, followed = noise.NoiseGAN(*networks, chosen), []
         gan.compile()
@@ -208,7 +181,7 @@ class Pipeline:
 
     def generate_noise(self, number: int, rng: np.random.Generator) -> np.ndarray:
         """Windows of generated noise, float32 of shape `(number, window)`."""
-        return np.float32(self.noise_unit) * noise.generate_noise(self.generator, number, self.settings, rng)
+        return noise.generate_noise(self.generator, number, self.settings, rng)
 
     # -- Combined ------------------------------------------------------------------------------------------------------
 
@@ -219,14 +192,7 @@ class Pipeline:
     # -- what claims ask for -------------------------------------------------------------------------------------------
 
     def measure(self, name: str, make: Callable[["Pipeline"], dict[str, float]], networks: Sequence[str], version: int) -> dict[str, float]:
-        """Measurements on trained networks, kept as a stage.
-
-        Args:
-            name: Name of the stage.
-            make: Measures the pipeline.
-            networks: The networks that it uses: `enhancer`, `noise GAN` or both.
-            version: Its version.
-        """
+        """Measurements that `make` makes of the pipeline and its networks (`enhancer`, `noise GAN` or both), kept as a stage."""
         if name not in self._measured:
             for network in networks:
                 _ = self.enhancer_folder if network == "enhancer" else self.gan_folder

@@ -13,18 +13,11 @@ Signal = Callable[[np.ndarray], np.ndarray]
 
 MODES = ("stuck", "drift", "gain_loss", "friction", "dropout", "period_change")
 """Degraded modes: the mechanism stands still, the sensor drifts or loses gain, motion lags, samples are lost, periods grow."""
-ONSET = 0.25  # share of a window before the degradation begins
 RUN = 10  # samples that `dropout` loses at a time
 
 
 def square_wave(time: np.ndarray, period: float, amplitude: float) -> np.ndarray:
-    """A square wave, `amplitude` in the first half of each period and `-amplitude` in the second.
-
-    Args:
-        time: Times in seconds, any shape.
-        period: The period in seconds.
-        amplitude: Half the difference of the two levels.
-    """
+    """A square wave at times in seconds: `amplitude` in the first half of each period and `-amplitude` in the second."""
     return np.where(np.mod(time / period, 1.0) < 0.5, amplitude, -amplitude)
 
 
@@ -38,7 +31,16 @@ def simulator(settings: Settings) -> Signal:
     return simulate
 
 
-def degrade(signal: Signal, time: np.ndarray, mode: str, severity: float, settings: Settings, rng: np.random.Generator) -> np.ndarray:
+def degrade(
+    signal: Signal,
+    time: np.ndarray,
+    mode: str,
+    severity: float,
+    levels: tuple[float, float],
+    shortest_period: float,
+    rng: np.random.Generator,
+    onset: int,
+) -> np.ndarray:
     """A signal in a degraded mode.
 
     The signal is a function of time, so that the true signal and the simulation are degraded alike by the same state of `rng`.
@@ -48,14 +50,15 @@ def degrade(signal: Signal, time: np.ndarray, mode: str, severity: float, settin
         time: Times in seconds, shape `(windows, samples)`.
         mode: One of `MODES`, or `nominal`.
         severity: Severity from 0 to 1.
-        settings: Amplitudes and periods.
+        levels: Lowest and highest nominal level.
+        shortest_period: Shortest period of the signal in seconds.
         rng: Draws the lags of `friction` and the losses of `dropout`.
+        onset: The first sample that is degraded.
 
     Returns:
         float64 array of shape `(windows, samples)`.
     """
-    onset = int(round(ONSET * time.shape[1], 6))
-    time, late = time.copy(), time[:, onset:]
+    time, late, (low, high) = time.copy(), time[:, onset:], levels
     begin = late[:, :1]
 
     # what ails the mechanism changes when the signal happens
@@ -65,20 +68,20 @@ def degrade(signal: Signal, time: np.ndarray, mode: str, severity: float, settin
     elif mode == "period_change":
         time[:, onset:] = begin + (late - begin) / (1 + severity)
     elif mode == "friction":
-        quarter, elapsed = settings.rotation_period / 4, late[0] - late[0, 0]
-        knots = np.arange(0, elapsed[-1] + 4 * quarter, quarter)
+        quarter, elapsed = shortest_period / 4, late[0] - late[0, 0]
+        knots = np.arange(0, elapsed[-1] + shortest_period, quarter)
         lags = rng.uniform(0, severity * quarter, (len(time), len(knots)))
         lags[:, 0] = 0
         time[:, onset:] = late - np.stack([np.interp(elapsed, knots, lag) for lag in lags])
     values = signal(time)
 
     # what ails the sensor changes its values
-    after, size = values[:, onset:], settings.orbit_amplitude + settings.rotation_amplitude
+    after, middle = values[:, onset:], (low + high) / 2
     if mode == "drift":
-        after += severity * 2 * size * np.linspace(0, 1, after.shape[1])
+        after += severity * (high - low) * np.linspace(0, 1, after.shape[1])
     elif mode == "gain_loss":
-        after *= 1 - severity
+        after[:] = middle + (1 - severity) * (after - middle)
     elif mode == "dropout":
         lost = rng.random((len(time), -(-after.shape[1] // RUN))) < severity / 2
-        after[np.repeat(lost, RUN, axis=1)[:, : after.shape[1]]] = -size
+        after[np.repeat(lost, RUN, axis=1)[:, : after.shape[1]]] = low
     return values

@@ -58,11 +58,7 @@ class Store(Protocol):
 
 
 class ParquetStore:
-    """One Parquet file with the columns `time` and `value`.
-
-    Args:
-        path: The file.
-    """
+    """One Parquet file with the columns `time` and `value`."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -101,10 +97,7 @@ def make_telemetry(settings: Settings, rng: np.random.Generator) -> Telemetry:
 def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetry]:
     """Cuts telemetry into `PARTS`, with a gap of one window between them, so that no window lies in two parts.
 
-    Args:
-        telemetry: The whole series.
-        window: Samples in a window.
-        average: Samples in the moving average, which shortens the noise of a part.
+    The moving average of `average` samples shortens the noise of a part.
 
     Raises:
         InputError: If a part would be too short for ten windows of noise that begin at different samples.
@@ -114,17 +107,12 @@ def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetr
         stop = first + int(usable * share)
         if stop - first < window + average + 9:
             raise InputError(
-                f"Expected at least {samples_needed(window, average):,} samples of telemetry. Received: {len(telemetry.values):,}. "
-                "Use a longer series."
+                f"Expected at least {4 * (window + average + 10) + 2 * window:,} samples of telemetry. "
+                f"Received: {len(telemetry.values):,}. Use a longer series."
             )
         parts[name] = telemetry.part(first, stop)
         first = stop + window
     return parts
-
-
-def samples_needed(window: int, average: int) -> int:
-    """Number of samples with which `split` makes every part long enough."""
-    return 4 * (window + average + 10) + 2 * window
 
 
 def random_starts(num_samples: int, window: int, number: int, rng: np.random.Generator) -> np.ndarray:
@@ -133,12 +121,7 @@ def random_starts(num_samples: int, window: int, number: int, rng: np.random.Gen
 
 
 def disjoint_starts(num_samples: int, window: int) -> np.ndarray:
-    """First samples of all windows of a series that share no sample, in the order of time.
-
-    Of telemetry of one's own that is so short that there are fewer than 20, up to 200 windows overlap.
-    """
-    if num_samples < 20 * window:
-        return np.unique(np.linspace(0, num_samples - window, 200).astype(int))
+    """First samples of all windows of a series that share no sample, in the order of time."""
     return window * np.arange(num_samples // window)
 
 

@@ -4,13 +4,14 @@ import argparse
 import functools
 import importlib
 import sys
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import write_json
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.stages import VERSIONS, Stages, Turns
+from enhsim_tf.common.stages import VERSIONS, Stages
 from studies.common.settings import Settings
 from studies.common.tables import KeptTables
 
@@ -50,13 +51,13 @@ def collect(
     import pandas as pd
 
     parts: dict[str, list[pd.DataFrame]] = {}
-    turns = Turns(what, len(replicates), tell)
-    for name, replicate in replicates:
-        turns.begin(name)
+    began, total = time.monotonic(), len(replicates)
+    for number, (name, replicate) in enumerate(replicates, 1):
+        tell(f"{what} {number} of {total}: {name}")
         stages = Stages(cache, fresh, tell, speaks=not sys.stdout.isatty())
         for each, table in replicate(stages).items():
             parts.setdefault(each, []).append(table)
-        turns.end(stages)
+        tell(f"{number} of {total} {what}s in {time.monotonic() - began:.0f} s")
         from enhsim_tf.common.backend import keras
 
         keras.backend.clear_session()  # frees the memory of the replicate's networks

@@ -69,7 +69,10 @@ class Replicate:
         told = self.stages.progress.loop("arm", len(ARMS))
         for number, arm in enumerate(ARMS):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
-            on_detector = told.within(number, len(detectors))
+
+            def on_detector(done: float, before: int = number, of: int = len(detectors)) -> None:
+                told(before + done / of)
+
             judged = evaluation.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
             for name in TABLES:
                 rows[name] += [{"arm": arm, **row} for row in judged[name]]

@@ -42,10 +42,13 @@ def test_the_traffic_and_the_work_of_the_enhancer():
     assert rows.WINDOW_FLOP == 2 * sum(inputs * outputs for inputs, outputs in layers)
 
 
-def test_a_worker_says_why_it_is_skipped(monkeypatch, tmp_path):
+def test_a_worker_times_its_work_or_says_why_it_is_skipped(monkeypatch, tmp_path):
     (tmp_path / "torch.py").write_text("raise ImportError('no torch here')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     assert Worker("torch_enhancer", "enhancer_step", num_steps=1).skipped == "no torch here"
+    worker = Worker("tool", "product_gather_sum", num_windows=20)
+    assert worker.skipped is None and worker.repeat() > 0
+    worker.close()
 
 
 @pytest.mark.parametrize("arguments", [["--quick"], ["--only", "gan"]])
@@ -58,13 +61,6 @@ def test_a_partial_run_does_not_replace_the_results(arguments, capsys):
 def test_help_needs_no_tensorflow():
     program = "import sys, benchmarks.__main__\nassert 'tensorflow' not in sys.modules"
     subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)
-
-
-@pytest.mark.slow
-def test_a_worker_times_each_repetition():
-    worker = Worker("ours", "copy", num_bytes=80_000)
-    assert worker.skipped is None and worker.repeat() > 0 and worker.repeat() > 0
-    worker.close()
 
 
 def test_a_run_writes_its_rows(tmp_path, monkeypatch, capsys):

@@ -1,12 +1,14 @@
-"""Each measure compared with a closed form, or with values computed by hand."""
+"""Each measure and feature compared with a closed form, or with values computed by hand; two-sample tests with their definitions."""
 
 import numpy as np
 import pytest
-import scipy.linalg
+import scipy.signal
 import scipy.stats
+from sklearn.metrics import roc_auc_score
 
 from enhsim_tf.common import measures
-from studies.robustness import distances
+from enhsim_tf.common.two_sample import HeldOut, two_sample_auc
+from enhsim_tf.common.window_features import signal_edges, signal_features, window_features
 
 
 def normal(*shape, seed=0):
@@ -15,15 +17,7 @@ def normal(*shape, seed=0):
 
 def autoregressive(num_windows, samples, coefficient, seed=0):
     """AR(1) windows of variance 1."""
-    innovations = normal(num_windows, samples, seed=seed)
-    values = innovations.copy()
-    for sample in range(1, samples):
-        values[:, sample] = coefficient * values[:, sample - 1] + np.sqrt(1 - coefficient**2) * innovations[:, sample]
-    return values
-
-
-def windows_of_t(num_windows, seed=5):
-    return np.random.default_rng(seed).standard_t(5, (num_windows, 500))
+    return scipy.signal.lfilter([np.sqrt(1 - coefficient**2)], [1, -coefficient], normal(num_windows, samples + 50, seed=seed))[:, 50:]
 
 
 def test_nrmse_by_hand():
@@ -31,21 +25,15 @@ def test_nrmse_by_hand():
     assert measures.nrmse(truth, truth) == 0
     assert measures.nrmse(np.full((2, 2), 3.0), truth) == pytest.approx(1)  # the mean
     assert measures.nrmse(truth + [[1, 1], [-1, -3]], truth) == pytest.approx(np.sqrt(12 / 4 / 5))
+    tiny = np.array([0, 2, 4, 6], np.float32) * np.float32(1e-25)  # squares are below what float32 can say
+    assert measures.nrmse(tiny[::-1].copy(), tiny) == pytest.approx(2)
 
 
-def test_nrmse_of_a_small_unit_in_float32():
-    truth = np.array([0, 2, 4, 6], np.float32) * np.float32(1e-25)  # squares are below what float32 can say
-    assert measures.nrmse(truth[::-1].copy(), truth) == pytest.approx(2)
-
-
-def test_roughness_of_a_sine():
+def test_roughness_in_closed_form():
     # a step of a sine of amplitude a and frequency f is a cosine of amplitude 2 a sin(pi f)
     time, amplitude, frequency = np.arange(401), 1.5, 3 / 40
     windows = amplitude * np.sin(2 * np.pi * frequency * time + np.array([[0.0], [1.0], [2.0]]))
     assert measures.roughness(windows) == pytest.approx(2 * amplitude * np.sin(np.pi * frequency) / np.sqrt(2))
-
-
-def test_roughness_of_white_noise_and_of_a_ramp():
     assert measures.roughness(0.3 * normal(200, 500)) == pytest.approx(0.3 * np.sqrt(2), rel=0.02)
     assert measures.roughness(np.arange(10.0)[None]) == pytest.approx(0)
 
@@ -57,10 +45,11 @@ def test_effective_rank_counts_equal_directions(directions):
     assert measures.effective_rank(windows) == pytest.approx(directions)
 
 
-def test_effective_rank_of_two_unequal_directions():
-    # energies 9 and 1: shares 0.9 and 0.1
-    windows = np.array([[3.0, 0], [-3, 0], [0, 1], [0, -1]])
+def test_effective_rank_in_closed_form():
+    windows = np.array([[3.0, 0], [-3, 0], [0, 1], [0, -1]])  # energies 9 and 1: shares 0.9 and 0.1
     assert measures.effective_rank(windows) == pytest.approx(np.exp(-0.9 * np.log(0.9) - 0.1 * np.log(0.1)))
+    # the eigenvalues of n samples over N windows follow Marchenko and Pastur's law, their entropy is log n - n / (2 N)
+    assert measures.effective_rank(normal(400, 60)) == pytest.approx(60 * np.exp(-60 / (2 * 400)), rel=0.01)
 
 
 @pytest.mark.filterwarnings("error")
@@ -70,142 +59,121 @@ def test_noise_that_does_not_vary_has_no_warning():
     assert measures.scale_difference(np.zeros((5, 8)), np.ones((5, 8))) == 0
 
 
-def test_effective_rank_of_white_noise():
-    # the eigenvalues of n samples over N windows follow Marchenko and Pastur's law, their entropy is log n - n / (2 N)
-    samples, num_windows = 60, 400
-    expected = samples * np.exp(-samples / (2 * num_windows))
-    assert measures.effective_rank(normal(num_windows, samples)) == pytest.approx(expected, rel=0.01)
-
-
-def test_autocorrelation_by_hand():
-    windows = np.array([[1.0, -1, 1, -1], [-1, 1, -1, 1]])
-    assert measures.autocorrelation(windows, 3) == pytest.approx([1, -1, 1, -1])
+def test_autocorrelation_by_hand_and_of_an_autoregressive_process():
+    assert measures.autocorrelation(np.array([[1.0, -1, 1, -1], [-1, 1, -1, 1]]), 3) == pytest.approx([1, -1, 1, -1])
     windows = np.array([[0.0, 1, 0, -1]]) + 3  # products at lag 2: 0 and -1; mean square 1/2
     assert measures.autocorrelation(windows, 2) == pytest.approx([1, 0, -1])
+    assert measures.autocorrelation(autoregressive(400, 500, 0.8), 6) == pytest.approx(0.8 ** np.arange(7), abs=0.02)
+    windows = np.array([[1.0, 2, 4], [-1, -2, -4]]) + 9
+    assert measures.lagged_products(windows, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
 
 
-def test_autocorrelation_of_an_autoregressive_process():
-    measured = measures.autocorrelation(autoregressive(400, 500, 0.8), 6)
-    assert measured == pytest.approx(0.8 ** np.arange(7), abs=0.02)
-    assert measured[0] == 1
-
-
-def test_scale_difference_is_the_logarithm_of_the_ratio():
+@pytest.mark.parametrize("factor", [1.1, 2.0])
+def test_scale_difference_is_the_logarithm_of_the_ratio(factor):
     windows = normal(20, 50)
     assert measures.scale_difference(windows, windows + 9) == pytest.approx(0)
-    for factor in (1.1, 2.0):
-        assert measures.scale_difference(factor * windows, windows) == pytest.approx(np.log(factor))
-        assert measures.scale_difference(windows, factor * windows) == pytest.approx(np.log(factor))
+    assert measures.scale_difference(factor * windows, windows) == pytest.approx(np.log(factor))
+    assert measures.scale_difference(windows, factor * windows) == pytest.approx(np.log(factor))
 
 
 def test_marginal_distance_of_a_shift_and_of_a_stretch():
-    real = 2 * normal(400, 500)
+    real, other = 2 * normal(400, 500), np.random.default_rng(5).standard_t(5, (60, 500))
     assert measures.marginal_distance(real[::-1, ::-1], real) == 0  # only the values count, not their order
     assert measures.marginal_distance(real + 0.6, real) == pytest.approx(0.6 / np.std(real))
-    assert measures.marginal_distance(0.6 + 2 * normal(400, 500, seed=1), real) == pytest.approx(0.3, abs=0.01)
-    by_definition = scipy.stats.wasserstein_distance(windows_of_t(60).ravel(), real[:60].ravel()) / np.std(real[:60])
-    assert measures.marginal_distance(windows_of_t(60), real[:60]) == pytest.approx(by_definition, rel=0.005)
+    by_definition = scipy.stats.wasserstein_distance(other.ravel(), real[:60].ravel()) / np.std(real[:60])
+    assert measures.marginal_distance(other, real[:60]) == pytest.approx(by_definition, rel=0.005)
     # a Gaussian stretched by s is |s - 1| E|z| = |s - 1| sqrt(2 / pi) away
     assert measures.marginal_distance(1.5 * real, real) == pytest.approx(0.5 * np.sqrt(2 / np.pi), rel=0.01)
 
 
-@pytest.mark.parametrize("samples", [128, 129])
-def test_power_spectrum_of_white_noise_is_flat(samples):
-    spectrum = distances.power_spectrum(0.5 * normal(2_000, samples))
-    assert spectrum.shape == (samples // 2,)
-    assert np.mean(spectrum) == pytest.approx(0.25, rel=0.01)
-    assert spectrum == pytest.approx(np.full(samples // 2, 0.25), rel=5 * np.sqrt(2 / 2_000))
+# -- features of windows ---------------------------------------------------------------------------------------------------
 
 
-def test_power_spectrum_of_a_sine_peaks_at_its_frequency():
-    windows = np.sin(2 * np.pi * 17 / 200 * np.arange(200) + np.array([[0.0], [1.0]]))
-    spectrum = distances.power_spectrum(windows)
-    assert np.argmax(spectrum) + 1 == 17  # the zero frequency is left out
-    assert spectrum[14:19].sum() == pytest.approx(spectrum.sum(), rel=1e-3)
+def test_features_of_a_window_worked_by_hand():
+    window = np.array([[1.0, -1, 1, -1, 1, -1, 1, -1]])
+    found = window_features(3 + 2 * window)[0, :6]
+    assert found == pytest.approx([3, np.log(2), 1 - 3, 5, np.log(np.std([-4, 4, -4, 4, -4, 4, -4])), -1])
 
 
-def test_lagged_products_by_hand():
-    windows = np.array([[1.0, 2, 4], [-1, -2, -4]])  # their mean is 0
-    assert measures.lagged_products(windows, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
-    assert measures.lagged_products(windows + 9, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
-    squares = np.array([[1.0, 4, 16]] * 2) - 7
-    assert distances.lagged_square_products(windows + 9, 1)[0] == pytest.approx([np.mean(squares[0] ** 2), (6 * 3 - 3 * 9) / 2])
+def test_features_of_white_noise_are_those_of_its_closed_form():
+    mean, log_sd, kurtosis, _, log_steps, correlation = np.mean(window_features(0.5 * normal(400, 500))[:, :6], axis=0)
+    assert [mean, log_sd, kurtosis, log_steps, correlation] == pytest.approx([0, np.log(0.5), 0, np.log(0.5 * np.sqrt(2)), 0], abs=0.02)
 
 
-def test_autocorrelation_distance_is_the_largest_difference():
-    one, other = np.array([[2.0, 1, 0], [2, 0, 0]]), np.array([[1.0, 0.5, 0.5]])  # correlations 1, 1/4, 0 and 1, 1/2, 1/2
-    assert distances.autocorrelation_distance(one, other) == pytest.approx(0.5)
-    assert distances.autocorrelation_distance(9 * one, one) == pytest.approx(0)
+def test_eight_bands_that_double_in_width():
+    # a sine in the middle of each octave of 1 ... 250 cycles a window is strongest in the band of its octave
+    cycles = np.array([1, 3, 6, 11, 23, 45, 90, 180])
+    features = window_features(np.sin(2 * np.pi * cycles[:, None] / 500 * np.arange(500)))
+    assert features.shape == (8, 14)
+    assert np.argmax(features[:, 6:], axis=1).tolist() == list(range(8))
+    assert np.isfinite(window_features(np.full((2, 500), 7.0, np.float32))).all()
 
 
-def test_autocorrelation_distance_of_processes_in_closed_form():
-    # a Gaussian process of correlation r has squares of correlation r^2
-    white, coloured = normal(400, 500, seed=1), autoregressive(400, 500, 0.7)
-    for describe, expected in ((measures.lagged_products, 0.7), (distances.lagged_square_products, 0.49)):
-        assert distances.autocorrelation_distance(describe(white, 50), describe(coloured, 50)) == pytest.approx(expected, abs=0.02)
+def test_edges_divide_levels_and_slopes_into_thirds():
+    signal = np.arange(30.0).reshape(3, 10) ** 2
+    for values, (low, high) in zip((signal, np.gradient(signal, axis=1)), signal_edges(signal), strict=True):
+        assert np.sum(values <= low) == pytest.approx(10, abs=1) and np.sum(values > high) == pytest.approx(10, abs=1)
 
 
-def test_log_scales_and_their_distance():
-    windows = np.array([[1.0, -1], [3, 1], [5, -5]])  # standard deviations 1, 1, 5
-    assert distances.log_scales(windows) == pytest.approx([0, 0, np.log(5)])
-    scales = distances.log_scales(normal(50, 100))
-    assert distances.log_scale_distance(scales[::-1] + 0.25, scales) == pytest.approx(0.25)
-    # equal in the mean, spread by one: half of each lies half a unit away on either side
-    assert distances.log_scale_distance(np.array([-1.0, 1]), np.array([0.0, 0])) == pytest.approx(1)
+def test_features_are_mean_and_scale_of_the_noise_at_each_level_and_slope():
+    signal = np.array([[0.0, 0, 1, 2, 2, 1, 0, 0]])  # slopes: 0 0.5 1 0.5 -0.5 -1 -0.5 0
+    noise = np.array([[1.0, 3, 4, 5, 7, 2, 1, 3]])
+    found = signal_features(noise, signal, np.array([[0.5, 1.5], [-0.25, 0.25]])).reshape(6, 2)
+    places = [1, 3, 1, 3], [4, 2], [5, 7], [7, 2, 1], [1, 3], [3, 4, 5]  # low, medium, high, falls, flat, rises
+    for (mean, log_scale), there in zip(found, places, strict=True):
+        assert mean == pytest.approx(np.mean(there)) and log_scale == pytest.approx(np.log(np.mean(np.square(there))) / 2)
 
 
-def test_kurtosis_of_known_distributions():
-    owner, shape = np.random.default_rng(0), (400, 500)
-    assert distances.excess_kurtosis(np.array([[1.0, -1], [1, -1]]) + 4) == pytest.approx(-2)
-    assert distances.excess_kurtosis(owner.uniform(size=shape)) == pytest.approx(-1.2, abs=0.01)
-    assert distances.excess_kurtosis(owner.laplace(size=shape)) == pytest.approx(3, abs=0.3)
-    assert distances.kurtosis_difference(owner.laplace(size=shape), owner.uniform(size=shape)) == pytest.approx(4.2, abs=0.3)
+def test_what_a_window_does_not_contain_is_taken_from_the_whole_window():
+    noise = np.array([[1.0, -1, 2, 2], [0.0, 0, 0, 0]])
+    found = signal_features(noise, np.full((2, 4), 5.0), np.array([[0.0, 1.0], [-1.0, 1.0]])).reshape(2, 6, 2)
+    np.testing.assert_allclose(found[0], np.tile([1.0, np.log(2.5) / 2], (6, 1)))
+    assert np.isfinite(found[1]).all()
 
 
-def test_tail_ratio_of_known_quantiles():
-    gaussian = normal(400, 500)
-    assert distances.tail_ratio(1.5 * gaussian, gaussian) == pytest.approx(1.5)
-    laplace = np.random.default_rng(1).laplace(size=(400, 500))  # 0.999 of its absolute values lie below log(1000)
-    assert distances.tail_ratio(laplace, gaussian) == pytest.approx(np.log(1000) / scipy.stats.norm.ppf(0.9995), rel=0.05)
+# -- two-sample tests ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("samples", [64, 65])
-def test_multitaper_spectrum_from_its_definition(samples):
-    # Slepian tapers are the eigenvectors of the sinc matrix of bandwidth 4 / samples; transforms by their sum
-    time = np.arange(samples)
-    apart = time[:, None] - time
-    tapers = scipy.linalg.eigh(np.where(apart == 0, 8 / samples, np.sinc(8 / samples * apart) * 8 / samples))[1][:, -7:]
-    windows, bins = 3 * normal(5, samples), np.arange(1, (samples - 1) // 2 + 1)
-    transform = np.exp(-2j * np.pi / samples * np.outer(time, bins))
-    expected = np.mean([np.abs((windows * taper) @ transform) ** 2 for taper in tapers.T], axis=0)
-    assert distances.window_spectra(windows) == pytest.approx(expected, rel=1e-6)
+@pytest.mark.parametrize("seed", [1, 3])
+def test_two_samples_of_one_process_cannot_be_told_apart(seed):
+    auc = two_sample_auc(normal(200, 100, seed=seed), normal(200, 100, seed=seed + 1), seed=0)
+    assert auc == pytest.approx(0.5, abs=5 * np.sqrt(401 / (12 * 200**2)))  # standard error of the rank sum
 
 
-def test_spectral_distances_by_hand():
-    real = np.ones((3, 4)) * [1, 10, 100, 1]
-    shape = np.exp([0.3, -0.3, 0.3, -0.3])
-    outlier = np.array([[1.0], [1.0], [1e6]])  # one window in three does not move a median
-    assert distances.geodesic_distance(outlier * real * shape, real) == pytest.approx(0.3)
-    assert distances.geodesic_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.3)
-    assert distances.log_spectral_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.5)
+def test_two_samples_of_two_processes_can_and_the_same_seed_says_the_same(refused):
+    first, again = (two_sample_auc(autoregressive(100, 100, 0.7), normal(120, 100, seed=3), seed=0) for _ in range(2))
+    assert first > 0.98 and first == again
+    with refused("10 windows"):
+        two_sample_auc(normal(9, 100), normal(40, 100), seed=0)
 
 
-def test_spectral_distances_of_an_autoregressive_process_in_closed_form():
-    white, coloured = (distances.window_spectra(windows) for windows in (normal(400, 500, seed=1), autoregressive(400, 500, 0.7)))
-    frequency = np.arange(1, 250) / 500
-    log_ratio = np.log(0.51 / np.abs(1 - 0.7 * np.exp(-2j * np.pi * frequency)) ** 2)
-    assert distances.geodesic_distance(coloured, white) == pytest.approx(np.std(log_ratio), rel=0.02)
-    assert distances.log_spectral_distance(coloured, white) == pytest.approx(np.sqrt(np.mean(log_ratio**2)), rel=0.02)
+def test_two_sample_folds_hold_out_neighbours():
+    # stretches of ten windows at a level of their own, of either kind by chance: whoever met a neighbour in training
+    # knows its level and so its kind
+    levels = np.random.default_rng(0).permutation(40).reshape(2, 20)
+    generated, real = (np.repeat(kind, 10)[:, None] + 0.01 * normal(200, 50) for kind in levels)
+    assert two_sample_auc(generated, real, seed=0) < 0.75
 
 
-def test_a_generator_that_stands_still_is_infinitely_far_and_finite():
-    still, real = np.zeros((30, 100)), normal(30, 100)
-    for describe, compare in (
-        (distances.window_spectra, distances.geodesic_distance),
-        (distances.window_spectra, distances.log_spectral_distance),
-        (distances.log_scales, distances.log_scale_distance),
-        (lambda windows: measures.lagged_products(windows, 20), distances.autocorrelation_distance),
-        (lambda windows: windows, distances.kurtosis_difference),
-        (lambda windows: windows, distances.tail_ratio),
-    ):
-        assert np.isfinite(compare(describe(still), describe(real)))
+def test_permutation_p_value_of_scores():
+    folds, labels = np.tile(np.repeat([0, 1], 30), 2), np.repeat([1, 0], 60)
+    assert HeldOut(labels + 0.1 * normal(120), labels, folds).p_value(99) == 0.01  # none of 99 is as large
+    by_chance = [HeldOut(normal(120, seed=seed), labels, folds).p_value(99) for seed in range(200)]
+    assert np.mean(by_chance) == pytest.approx(0.5, abs=5 / np.sqrt(12 * 200))
+    assert np.mean(np.array(by_chance) <= 0.1) == pytest.approx(0.1, abs=5 * np.sqrt(0.09 / 200))
+    # within each fold all scores are equal: whatever the labels, no order of them is larger
+    assert HeldOut(folds.astype(float), labels, folds).p_value(99) == 1
+
+
+def test_permutation_p_value_written_out():
+    folds, labels, scores = np.tile(np.repeat([0, 1], 5), 2), np.repeat([1, 0], 10), normal(20) + np.repeat([0.2, 0], 10)
+    owner, areas = np.random.default_rng(1), []
+    for _ in range(2_000):
+        shuffled = labels.copy()
+        for fold in (0, 1):
+            shuffled[folds == fold] = owner.permutation(labels[folds == fold])
+        areas.append(roc_auc_score(shuffled, scores))
+    held_out = HeldOut(scores, labels, folds)
+    expected = np.mean(np.array(areas) >= held_out.auc - 1e-9)
+    assert 0.01 < expected < 0.5
+    assert held_out.p_value(2_000) == pytest.approx(expected, abs=5 * np.sqrt(2 * expected / 2_000))

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from enhsim_tf.common.parallel import engines
-from enhsim_tf.common.parallel import ray as ray_engine
 from enhsim_tf.common.parallel.local import ProcessesDiedError
 from tests.small_data_set import PlainMaker, die_at_thirteen, meet, plan, refuse, threads_and_square, threads_of
 
@@ -86,12 +85,12 @@ def test_a_missing_ray_package_raises_one_line(monkeypatch, refused):
 
 @pytest.mark.slow
 @with_ray
-def test_ray_gives_the_same_results_and_replaces_killed_actors(tmp_path, monkeypatch, refused):
+def test_ray_gives_the_same_results_and_replaces_killed_processes(tmp_path, monkeypatch, refused):
     import ray
 
     from enhsim_tf.common.parallel.ray import _cluster
 
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # so that actors can import the work
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # so that processes can import the work
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
     with _cluster():  # one cluster for all checks, since starting one takes as long as the rest
         running, found = engines.run("ray", threads_and_square, range(60), 2), []
@@ -105,15 +104,17 @@ def test_ray_gives_the_same_results_and_replaces_killed_actors(tmp_path, monkeyp
         running, found = engines.run("ray", functools.partial(meet, tmp_path / "met", 8), range(60), 8), []
         for done in running:
             found.append(done)
-            if len(found) == 1:  # all eight at once, as when a node is lost with all its actors
+            if len(found) == 1:  # all eight at once, as when a node is lost with all its processes
                 for process in os.listdir(tmp_path / "met"):
                     os.kill(int(process), signal.SIGKILL)
         assert sorted(found) == list(range(60)) and len(os.listdir(tmp_path / "met")) > 8
         assert list(engines.run("ray", threads_of, [1], 1, threads=2)) == [("2", {1})]
         with refused("another number"):
             list(engines.run("ray", refuse, range(5), 1))
+        with refused("died in a row"):
+            list(engines.run("ray", die_at_thirteen, [13], 1))
         asked = plan(150, 50)
-        records = list(engines.run("ray", PlainMaker(asked, tmp_path), range(3), 3))  # on two cores: more actors than CPUs
+        records = list(engines.run("ray", PlainMaker(asked, tmp_path), range(3), 3))  # on two cores: more processes than CPUs
         (tmp_path / "here").mkdir()
         assert sorted(records) == [PlainMaker(asked, tmp_path / "here")(shard) for shard in range(3)]
     assert not ray.is_initialized()
@@ -129,29 +130,20 @@ def test_a_cluster_that_does_not_start_raises_one_line(error, monkeypatch, refus
 
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
     monkeypatch.setattr(ray, "init", init)
-    with refused("that starts here", "timed out"), ray_engine._cluster():
-        pass
-    error = KeyError("a mistake of ours")
-    with pytest.raises(KeyError), ray_engine._cluster():
-        pass
-
-
-@pytest.mark.slow
-@with_ray
-def test_a_local_cluster_starts_after_a_failed_connection(monkeypatch, refused):
-    from enhsim_tf.common.parallel.ray import _cluster
-
-    monkeypatch.setenv("RAY_ADDRESS", "ray://127.0.0.1:9")
-    with refused("ray://127.0.0.1:9"), _cluster():
-        pass
-    monkeypatch.delenv("RAY_ADDRESS")
-    with _cluster() as ray:
-        assert ray.is_initialized()
-
-
-@pytest.mark.slow
-@with_ray
-def test_a_missing_cluster_raises_one_line(monkeypatch, refused):
-    monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:1")
-    with refused("127.0.0.1:1"):
+    with refused("that starts here", "timed out"):
         list(engines.run("ray", refuse, [1], 1))
+    error = KeyError("a mistake of ours")
+    with pytest.raises(KeyError):
+        list(engines.run("ray", refuse, [1], 1))
+
+
+@pytest.mark.slow
+@with_ray
+def test_a_missing_cluster_raises_one_line_and_a_local_one_starts_after_it(monkeypatch, refused):
+    for address in ("127.0.0.1:1", "ray://127.0.0.1:9"):
+        monkeypatch.setenv("RAY_ADDRESS", address)
+        with refused(address):
+            list(engines.run("ray", threads_and_square, [1], 1))
+    monkeypatch.delenv("RAY_ADDRESS")
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
+    assert [done[0] for done in engines.run("ray", threads_and_square, [3], 1)] == [9]

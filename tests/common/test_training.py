@@ -15,16 +15,6 @@ def small(seed=0):
     return dense_stack(20, (20, 64, 64, 20), seed, "enhancer")
 
 
-def weights_of(model):
-    return np.concatenate([weight.ravel() for weight in model.get_weights()])
-
-
-def fit_small(model, seed, inputs=None, **arguments):
-    inputs = windows(150) if inputs is None else inputs
-    arguments = {"epochs": 3, "batch_size": 15, "verbose": 0, **arguments}
-    return fit_windows(model, inputs, np.cumsum(inputs, axis=1), seed=seed, **arguments)
-
-
 def test_layers_of_one_seed_are_independent():
     first, second = dense_stack(50, (50, 50, 50), seed=0, name="equal").layers[:2]
     assert abs(np.corrcoef(np.ravel(first.kernel), np.ravel(second.kernel))[0, 1]) < 5 / 50
@@ -54,14 +44,13 @@ def test_known_linear_map_is_learnt_to_a_known_error():
     held_out, clean, noisy = pairs(1_000, 3)
     model = small()
     untrained = np.mean((predict_windows(model, held_out, 1_024) - noisy) ** 2)
-    history = fit_windows(model, source, target, 15, 50, seed=0, validation=(held_out, noisy), verbose=0)
+    losses = fit_windows(model, source, target, 15, 50, seed=0)
     enhanced = predict_windows(model, held_out, 1_024)
     error = np.mean((enhanced - noisy) ** 2)
     assert untrained > np.var(clean) > 5 * noise_sd**2  # the untrained error is far above the noise
     assert error == pytest.approx(np.mean((noisy - clean) ** 2), rel=0.1)
     assert np.mean((enhanced - clean) ** 2) < 0.1 * noise_sd**2  # the noise is averaged away, not learnt
-    assert history["val_loss"].shape == history["loss"].shape == (15,)
-    assert history["val_loss"][-1] == pytest.approx(error, rel=1e-4)
+    assert losses.shape == (15,) and losses[-1] < losses[0]
 
 
 def test_every_window_is_seen_once_an_epoch_in_an_order_drawn_anew():
@@ -74,7 +63,7 @@ def test_every_window_is_seen_once_an_epoch_in_an_order_drawn_anew():
 
     model = keras.Sequential([keras.Input((1,)), keras.layers.Dense(1, kernel_initializer="zeros")])
     targets = np.sqrt(np.arange(12, dtype=np.float32))[:, None]
-    fit_windows(model, targets, targets, 3, 1, seed=0, learning_rate=0.0, callbacks=[Order()], verbose=0)
+    fit_windows(model, targets, targets, 3, 1, seed=0, learning_rate=0.0, callbacks=[Order()])
     sums = np.array(Order.losses).reshape(3, 12)
     orders = np.round(np.diff(sums, axis=1, prepend=0)).astype(int)
     assert np.sort(orders, axis=1).tolist() == [list(range(12))] * 3
@@ -85,20 +74,10 @@ def test_every_window_is_seen_once_an_epoch_in_an_order_drawn_anew():
 def test_all_random_numbers_depend_on_the_seeds_only():
     def run(global_seed, weights_seed, order_seed):
         keras.utils.set_random_seed(global_seed)  # must not matter
-        model = small(weights_seed)
-        history = fit_small(model, order_seed, validation=(windows(20, seed=9), windows(20, seed=9)))
-        return {"weights": weights_of(model), **history}
+        model, inputs = small(weights_seed), windows(150)
+        losses = fit_windows(model, inputs, np.cumsum(inputs, axis=1), 3, 15, seed=order_seed)
+        return losses, np.concatenate([weight.ravel() for weight in model.get_weights()])
 
     first, again, other_weights, other_order = run(1, 0, 0), run(2, 0, 0), run(1, 5, 0), run(1, 0, 5)
-    assert set(first) == {"weights", "loss", "val_loss"}
-    for key, values in first.items():
-        assert (values == again[key]).all()
-        assert (values != other_weights[key]).any() and (values != other_order[key]).any()
-
-
-@pytest.mark.slow
-def test_compiled_and_plain_training_are_the_same():
-    compiled, plain = small(), small()
-    histories = [fit_small(model, 0, jit_compile=jit) for model, jit in ((compiled, True), (plain, False))]
-    assert histories[0]["loss"] == pytest.approx(histories[1]["loss"], rel=1e-3)
-    np.testing.assert_allclose(weights_of(compiled), weights_of(plain), atol=1e-3)
+    for values, same, *others in zip(first, again, other_weights, other_order, strict=True):
+        assert (values == same).all() and all((values != other).any() for other in others)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.common.blockwise_training import is_wide_dense_stack
+from enhsim_tf.common.fast_keras import is_wide_dense_stack
 from enhsim_tf.paper.enhancer import Pairs, build_enhancer, enhance, train_enhancer
 from enhsim_tf.paper.settings import make_settings
 from tests.paper.conftest import tiny_settings
@@ -51,9 +51,8 @@ def test_the_network_learns_a_map_from_noisy_targets():
 def test_fast_training_gives_the_weights_of_plain_keras():
     trained = []
     for fast in (False, True):
-        settings = tiny_settings(
-            window=10, filter_width=10, hidden_units=1_200, epochs=2, fast=fast
-        )  # a kernel of 5.8 MB is trained by blocks
+        # a kernel of 5.8 MB is trained by blocks
+        settings = tiny_settings(window=10, filter_width=10, hidden_units=1_200, epochs=2, fast=fast)
         source, target = training(settings, 45)
         network = build_enhancer(settings)
         assert is_wide_dense_stack(network)

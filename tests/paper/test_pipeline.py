@@ -4,8 +4,7 @@ import pytest
 from enhsim_tf.paper.claims import CLAIMS, NOT_MEASURED, judge_all, outside
 from enhsim_tf.paper.noise import NoiseGAN
 from enhsim_tf.paper.square_wave import simulator
-from enhsim_tf.paper.telemetry import Telemetry, make_telemetry
-from tests.paper.conftest import TINY, tiny_pipeline, tiny_settings
+from tests.paper.conftest import TINY, tiny_pipeline
 
 
 @pytest.fixture(scope="module")
@@ -62,14 +61,3 @@ def test_a_training_that_learnt_nothing_is_named(records, cache, tmp_path, monke
     named = outside(broken_records, {"claims": of_gan})
     assert any(line.startswith("C5: late_") for line in named)
     assert any(line.startswith("C6: ") for line in named)
-
-
-def test_telemetry_of_ones_own_runs_without_a_known_truth(tmp_path):
-    settings = tiny_settings()
-    example = make_telemetry(settings, np.random.default_rng(9))
-    own = Telemetry(example.values[:8_000], 1.0, name="my channel")
-    found = tiny_pipeline(tmp_path)
-    found = type(found)(settings, found.stages, own=own, own_simulator=simulator(settings))
-    verdicts = {record["id"]: record["verdict"] for record in judge_all(found)}
-    assert {name for name, verdict in verdicts.items() if verdict == NOT_MEASURED} == {"C3", "C8", "C9"}
-    assert np.std(found.noise_windows("train")) / found.noise_unit == pytest.approx(0.1)

@@ -52,11 +52,15 @@ def test_a_square_wave_is_high_in_the_first_half_of_its_period():
     np.testing.assert_array_equal(square_wave(np.array([0, 59, 60, 119, 120]), 120, 0.25), [0.25, 0.25, -0.25, -0.25, 0.25])
 
 
+def degraded(signal, time, mode, severity):
+    return degrade(signal, time, mode, severity, (-0.75, 0.75), 120.0, np.random.default_rng(0), 100)
+
+
 @pytest.mark.parametrize("signal", [SIGNAL, simulator(SETTINGS)])
 @pytest.mark.parametrize("mode", MODES)
 def test_a_mode_without_severity_is_nominal_and_one_with_it_changes_what_follows_the_onset(mode, signal):
     time = np.arange(400.0)[None] + np.array([[0.0], [77.0]])
-    nominal, mild, hard = (degrade(signal, time, mode, severity, SETTINGS, np.random.default_rng(0)) for severity in (0, 1e-9, 0.9))
+    nominal, mild, hard = (degraded(signal, time, mode, severity) for severity in (0, 1e-9, 0.9))
     np.testing.assert_allclose(nominal, signal(time), atol=1e-12)
     np.testing.assert_array_equal(hard[:, :100], signal(time)[:, :100])
     assert np.abs(hard[:, 100:] - nominal[:, 100:]).max() > 0.1
@@ -64,10 +68,10 @@ def test_a_mode_without_severity_is_nominal_and_one_with_it_changes_what_follows
 
 
 def test_degraded_values_worked_out_by_hand():
-    time, rng = np.arange(400.0)[None], np.random.default_rng(0)
+    time = np.arange(400.0)[None]
     late = SIGNAL(time[0, 100:])
-    np.testing.assert_allclose(degrade(SIGNAL, time, "gain_loss", 0.5, SETTINGS, rng)[0, 100:], late / 2)
-    np.testing.assert_allclose(degrade(SIGNAL, time, "stuck", 1.0, SETTINGS, rng)[0, 100:], late[0])
-    np.testing.assert_allclose(degrade(SIGNAL, time, "drift", 0.5, SETTINGS, rng)[0, -1], late[-1] + 0.75)
+    np.testing.assert_allclose(degraded(SIGNAL, time, "gain_loss", 0.5)[0, 100:], late / 2)
+    np.testing.assert_allclose(degraded(SIGNAL, time, "stuck", 1.0)[0, 100:], late[0])
+    np.testing.assert_allclose(degraded(SIGNAL, time, "drift", 0.5)[0, -1], late[-1] + 0.75)
     stretched = SIGNAL(100 + (time[0, 100:] - 100) / 1.5)
-    np.testing.assert_allclose(degrade(SIGNAL, time, "period_change", 0.5, SETTINGS, rng)[0, 100:], stretched)
+    np.testing.assert_allclose(degraded(SIGNAL, time, "period_change", 0.5)[0, 100:], stretched)

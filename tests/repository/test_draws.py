@@ -42,20 +42,18 @@ def test_every_random_draw_uses_an_explicit_generator_or_seed():
     assert {module: draws for module, draws in found.items() if draws} == {}
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "np.random.normal(3)",
-        "np.random.seed(0)",
-        "np.random.default_rng()",
-        "tf.random.normal((3,))",
-        "tf.random.set_seed(0)",
-        "keras.utils.set_random_seed(1)",
-        "keras.random.normal((3,))",
-        "keras.layers.Dropout(0.3)",
-        "keras.layers.Dense(3)",
-        "import random",
-    ],
-)
+DRAWS = """np.random.normal(3)
+np.random.seed(0)
+np.random.default_rng()
+tf.random.normal((3,))
+tf.random.set_seed(0)
+keras.utils.set_random_seed(1)
+keras.random.normal((3,))
+keras.layers.Dropout(0.3)
+keras.layers.Dense(3)
+import random""".splitlines()
+
+
+@pytest.mark.parametrize("text", DRAWS)
 def test_draws_without_a_generator_or_seed_are_detected(text):
     assert unowned_draws(ast.parse(text))

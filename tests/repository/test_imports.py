@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "enhsim_tf"
-WITH_NETWORKS = """common.backend common.training common.fused_adam common.blockwise_training common.convolution_maximum""".split()
+WITH_NETWORKS = "common.backend", "common.training", "common.fast_keras"
 NOT_TRIED = ("paper", "__main__")
 
 

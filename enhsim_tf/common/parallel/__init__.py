@@ -1,4 +1,4 @@
-"""Parallel work: calls a function for many items, in processes of this machine or in Ray actors.
+"""Parallel work: calls a function for many items, in processes of this machine or of a Ray cluster.
 
 This package depends on neither telemetry nor files.
 """

@@ -4,13 +4,12 @@ Each process uses a fixed number of threads, so that results do not depend on th
 replaced and its item is computed again. An engine gives up after more than five consecutive worker failures.
 """
 
-import functools
 import pickle
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.parallel.local import run_local, start_worker
+from enhsim_tf.common.parallel.local import run_local
 from enhsim_tf.common.parallel.ray import run_ray
 
 ENGINES = {"local": 512, "ray": 10_000}  # name: maximum number of workers
@@ -35,23 +34,17 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
     """
     if engine not in ENGINES:
         raise InputError(f"Expected an engine, one of: {', '.join(ENGINES)}. Received: {engine!r}.")
-    check_workers(engine, workers)
-    first = functools.partial(start_worker, pickle.dumps(work), threads)
-    return {"local": run_local, "ray": run_ray}[engine](first, iter(items), workers)
+    _check_workers(engine, workers)
+    return {"local": run_local, "ray": run_ray}[engine](pickle.dumps(work), threads, iter(items), workers)
 
 
-def check_workers(engine: str, workers: int | None) -> None:
-    """Raises an `InputError` if an engine does not take so many workers; None is one per CPU."""
+def _check_workers(engine: str, workers: int | None) -> None:
     if workers is not None and not 1 <= workers <= ENGINES[engine]:
         raise InputError(f"Expected from 1 to {ENGINES[engine]:,} workers, or auto. Received: {workers}.")
 
 
 def parse_workers(text: str | None, engine: str | None = None) -> int | None:
-    """Parses the option `--workers auto|N`.
-
-    Args:
-        text: The option's value.
-        engine: The engine that runs them; None is `local`.
+    """Parses the option `--workers auto|N`, for the engine `local` if none is given.
 
     Returns:
         The number of workers, or None for one per CPU.
@@ -63,5 +56,5 @@ def parse_workers(text: str | None, engine: str | None = None) -> int | None:
         return None
     if not (text.isascii() and text.isdecimal() and 1 <= len(text) <= 9 and int(text)):
         raise InputError(f"Expected --workers auto, or a number of them. Received: {text!r}.")
-    check_workers(engine or "local", int(text))
+    _check_workers(engine or "local", int(text))
     return int(text)

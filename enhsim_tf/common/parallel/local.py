@@ -1,8 +1,9 @@
-"""The engine `local`, a pool of spawned processes, and what all engines share: worker start-up and the count of failures."""
+"""The engine `local`, a pool of spawned processes, and how a worker of any engine starts."""
 
 import collections
 import concurrent.futures
 import contextlib
+import functools
 import multiprocessing
 import multiprocessing.connection
 import os
@@ -15,7 +16,7 @@ from typing import Any
 
 from enhsim_tf.common.errors import InputError
 
-_MAX_FAILURES = 5  # consecutive, without a finished item between them
+MAX_FAILURES = 5  # consecutive deaths of workers after which work is given up at the next
 
 _work: Callable[[Any], Any] | None = None  # the function that a pool process calls for each item
 
@@ -24,61 +25,23 @@ class ProcessesDiedError(InputError):
     """Raised when too many workers died in a row.
 
     Args:
-        message: Description of the problem.
         items: Items that were being computed. The item that kills the workers is among them.
+        reason: Why they died, if known.
     """
 
-    def __init__(self, message: str, items: Iterable[Any]):
-        super().__init__(message)
+    def __init__(self, items: Iterable[Any], reason: str = ""):
+        super().__init__(
+            f"Expected worker processes that stay alive. Received: {MAX_FAILURES + 1} that died in a row{reason and f' ({reason})'}. "
+            "Memory may be too small: use fewer --workers. Finished work is kept."
+        )
         self.items = tuple(items)
 
 
-class WorkerFailures:
-    """Counts consecutive worker failures."""
-
-    def __init__(self):
-        self.count = 0
-
-    def add(self, items: Iterable[Any], reason: str = "") -> None:
-        """Counts one more failure.
-
-        Args:
-            items: Items that were being computed when the worker died.
-            reason: Why it died, if known.
-
-        Raises:
-            ProcessesDiedError: If there were too many failures in a row.
-        """
-        self.count += 1
-        if self.count > _MAX_FAILURES:
-            raise ProcessesDiedError(
-                f"Expected worker processes that stay alive. Received: {self.count} that died in a row{reason and f' ({reason})'}. "
-                "Memory may be too small: use fewer --workers. Finished work is kept.",
-                items,
-            )
-
-    def reset(self) -> None:
-        """Sets the count to zero, because an item was finished."""
-        self.count = 0
-
-
-def run_local(initialize: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
-    """Implements `engines.run` with processes of this machine.
-
-    Args:
-        initialize: Called once in each process. Returns the function that is then called for each item.
-        items: Arguments of that function.
-        workers: Number of processes. None: one per CPU.
-
-    Yields:
-        The result for each item.
-
-    Raises:
-        InputError: If the function raises one, or if the processes keep dying.
-    """
-    num_processes, retry, failures = workers or num_cpus(), collections.deque(), WorkerFailures()
-    while True:
-        with _pool(initialize, num_processes) as pool:  # it starts a process when an item is submitted and none is idle
+def run_local(work: bytes, threads: int, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
+    """Implements `engines.run` with processes of this machine; `work` is pickled."""
+    num_processes, retry, failures = workers or num_cpus(), collections.deque(), 0
+    while failures <= MAX_FAILURES:
+        with _pool(work, threads, num_processes) as pool:  # it starts a process when an item is submitted and none is idle
             running: dict[concurrent.futures.Future, Any] = {}
             try:
                 while True:
@@ -89,11 +52,12 @@ def run_local(initialize: Callable[[], Any], items: Iterator[Any], workers: int 
                     for done in concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED).done:
                         result = done.result()
                         del running[done]
-                        failures.reset()
+                        failures = 0
                         yield result
             except BrokenProcessPool:
                 retry.extend(running.values())
-        failures.add(retry)
+        failures += 1
+    raise ProcessesDiedError(retry)
 
 
 def num_cpus() -> int:
@@ -116,10 +80,10 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, retry: coll
 
 
 @contextlib.contextmanager
-def _pool(initialize: Callable[[], Any], workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
+def _pool(work: bytes, threads: int, workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
     """A pool of spawned processes that is terminated at once if the block raises. Forking is not used, since TensorFlow hangs."""
     others = set(multiprocessing.active_children())
-    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _initialize_pool_worker, (initialize,))
+    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _start_pool_worker, (work, threads))
     is_done = False
     try:
         yield pool
@@ -130,30 +94,24 @@ def _pool(initialize: Callable[[], Any], workers: int) -> Iterator[concurrent.fu
         pool.shutdown(wait=True, cancel_futures=True)
 
 
+@functools.lru_cache(1)
 def start_worker(work: bytes, threads: int) -> Callable[[Any], Any]:
-    """Initializes a process of any engine.
+    """Prepares a process of any engine, and returns the unpickled function.
 
     The thread counts are set before `work` is unpickled, because unpickling imports the libraries that read them.
-
-    Args:
-        work: The pickled function to be called for each item.
-        threads: Number of TensorFlow threads.
-
-    Returns:
-        The unpickled function.
     """
     one = dict.fromkeys(("TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     os.environ |= one | {"TF_NUM_INTRAOP_THREADS": str(threads), "CUDA_VISIBLE_DEVICES": ""}
-    work = pickle.loads(work)
+    function = pickle.loads(work)
     import threadpoolctl
 
     threadpoolctl.threadpool_limits(1)  # a Ray process has already imported NumPy
-    return work
+    return function
 
 
-def _initialize_pool_worker(initialize: Callable[[], Any]) -> None:
+def _start_pool_worker(work: bytes, threads: int) -> None:
     global _work
-    _work = initialize()
+    _work = start_worker(work, threads)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

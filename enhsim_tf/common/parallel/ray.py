@@ -1,100 +1,60 @@
-"""The engine `ray`: each worker is a Ray actor, on this machine or on the cluster at `RAY_ADDRESS`.
+"""The engine `ray`: each item is a Ray task, on this machine or on the cluster at `RAY_ADDRESS`.
 
-Plain actors and not Ray Data: what travels are items there and records back, which need no blocks, no plan and no read
-tasks that wait for a CPU which the actors hold; and a lost actor is replaced by the same few lines as a lost process.
-Nor Ray's own restarts, which count all deaths of an actor and not those in a row: measured with 2.60, `max_restarts=5` gives up after six
-deaths with work finished between all of them, and `max_restarts=-1` starts what dies as it begins without end (24 times in 45 s).
+Ray computes a task again whose process or node is lost, and gives a task up that loses `MAX_FAILURES` times more.
 """
 
-import collections
 import contextlib
-import itertools
 import logging
 import os
 import socket
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
-from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.parallel.local import WorkerFailures
+from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.parallel.local import MAX_FAILURES, ProcessesDiedError, start_worker
 
 _ANSWER_S = 10
 _REFUSALS = (ConnectionError, RuntimeError, OSError, ValueError)
-_ACTOR_CPUS = 0.4  # CPUs requested by each actor: if half of a cluster is lost, all actors still fit on the other half
 
 
-class _Actor:
-    """A worker process of the cluster."""
-
-    def __init__(self, initialize: Callable[[], Any]):
-        self.work = initialize()
-
-    def call(self, item: Any) -> tuple[str, Any]:
-        """Returns `("done", result)`, `("refused", message)` after an `InputError`, or, if `item` is None, `("ready", None)`."""
-        if item is None:
-            return "ready", None
-        try:
-            return "done", self.work(item)
-        except InputError as error:  # if it were raised, Ray would wrap it in an error of its own
-            return "refused", str(error)
+def _call(work: bytes, threads: int, item: Any) -> tuple[str, Any]:
+    """Returns `("done", result)`, or `("refused", message)` after an `InputError`, which Ray would wrap in an error of its own."""
+    try:
+        return "done", start_worker(work, threads)(item)
+    except InputError as error:
+        return "refused", str(error)
 
 
-def run_ray(initialize: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
-    """Implements `engines.run` with Ray actors.
-
-    Args:
-        initialize: Called once in each actor. Returns the function that is then called for each item.
-        items: Arguments of that function.
-        workers: Number of actors. None: one per CPU of the cluster.
-
-    Yields:
-        The result for each item.
-
-    Raises:
-        InputError: If the function raises one, if there is no such cluster, or if the actors keep dying.
-    """
-    one = list(itertools.islice(items, 1))
-    if not one:
+def run_ray(work: bytes, threads: int, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
+    """Implements `engines.run` with Ray tasks, of which `workers` run at a time, or one per CPU of the cluster; `work` is pickled."""
+    first = next(items, None)
+    if first is None:
         return
-    items = itertools.chain(one, items)
     with _cluster() as ray:
-        cpus = max(1.0, ray.cluster_resources().get("CPU", 1.0))
-        first = list(itertools.islice(items, workers or int(cpus)))
-        retry, items = collections.deque(), itertools.chain(first, items)
-        share = round(min(_ACTOR_CPUS, _ACTOR_CPUS * cpus / max(1, len(first))), 4)
-        make = ray.remote(_Actor).options(num_cpus=max(share, 1e-4), scheduling_strategy="SPREAD").remote
-        lost = tuple(getattr(ray.exceptions, f"{name}Error") for name in ("RayActor", "ObjectLost", "NodeDied", "OutOfMemory"))
-        waiting: dict[Any, tuple[Any, Any, WorkerFailures]] = {}
-
-        def ask(actor: Any, item: Any, failures: WorkerFailures) -> None:
-            waiting[actor.call.remote(item)] = actor, item, failures
-
-        every = [WorkerFailures() for _ in first]  # one count per actor and its replacements: a lost node ends many actors once each
-        for failures in every:
-            ask(make(initialize), None, failures)  # an actor that is not scheduled yet gets no item, so that another actor can take it
-        while waiting:
-            (done,), _ = ray.wait(list(waiting), num_returns=1)
-            actor, item, failures = waiting.pop(done)
-            try:
-                kind, result = ray.get(done)
-            except lost as error:
-                failures.add([] if item is None else [item], _last_line(error))
-                retry.extend([] if item is None else [item])
-                ask(make(initialize), None, failures)
-                continue
-            if kind == "refused":
-                raise InputError(result)
-            if kind == "done":
-                for failures_of_one in every:
-                    failures_of_one.reset()
-            following = retry.popleft() if retry else next(items, None)
-            if following is not None:
-                ask(actor, following, failures)
-            elif not any(each is not None for _, each, _ in waiting.values()):
-                waiting.clear()  # only actors that were never scheduled are left
-            if kind == "done":
+        cpus = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        number, running, item = workers or cpus, {}, first
+        call = ray.remote(_call).options(num_cpus=min(1, cpus / number), max_retries=MAX_FAILURES, scheduling_strategy="SPREAD")
+        lost = tuple(getattr(ray.exceptions, f"{name}Error") for name in ("WorkerCrashed", "ObjectLost", "NodeDied", "OutOfMemory"))
+        try:
+            while True:
+                while item is not None and len(running) < 2 * number:
+                    running[call.remote(work, threads, item)] = item
+                    item = next(items, None)
+                if not running:
+                    return
+                (done,), _ = ray.wait(list(running), num_returns=1)
+                try:
+                    kind, result = ray.get(done)
+                except lost as error:
+                    raise ProcessesDiedError([running[done]], _last_line(error)) from None
+                if kind == "refused":
+                    raise InputError(result)
+                del running[done]
                 yield result
+        finally:
+            for task in running:
+                ray.cancel(task, force=True)
 
 
 @contextlib.contextmanager
@@ -143,6 +103,6 @@ def _check_address(address: str | None) -> None:
 
 
 def _last_line(error: Exception) -> str:
-    """The printable part of the last line of an error's message, which is where Ray states the reason."""
+    """The last line of an error's message, which is where Ray states the reason."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~")]
-    return "".join(character for character in (lines or [type(error).__name__])[-1] if character.isprintable())[:160].rstrip(".")
+    return printable((lines or [type(error).__name__])[-1])[:160].rstrip(".")

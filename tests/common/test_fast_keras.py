@@ -1,0 +1,195 @@
+"""What is fast against plain Keras: the same values, gradients, losses and weights up to rounding, for every form of layer and batch."""
+
+import keras
+import numpy as np
+import pytest
+import tensorflow as tf
+
+from enhsim_tf.common import fast_keras
+from enhsim_tf.common.fast_keras import convolution_maximum, fused_adam, is_wide_dense_stack, with_fast_convolution
+from enhsim_tf.common.training import dense_stack, fit_windows
+from enhsim_tf.paper import noise as of_paper
+from tests.paper.conftest import tiny_settings
+
+RNG = np.random.default_rng
+
+
+def test_fused_adam_moves_the_weights_as_adam_does():
+    start, rng = np.linspace(-1, 1, 50).astype(np.float32), RNG(1)
+    gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(np.float32)  # from far below epsilon upwards
+    moved = []
+    for optimizer in (fused_adam(0.01), keras.optimizers.Adam(0.01)):
+        weight = keras.Variable(start)
+        optimizer.build([weight])
+        for gradient in gradients:
+            optimizer.apply([tf.constant(gradient)], [weight])
+        moved.append(weight.numpy() - start)
+    np.testing.assert_allclose(moved[0], moved[1], rtol=1e-4, atol=2e-6)
+    assert np.abs(moved[0]).max() > 0.1
+
+
+# -- Dense layers by blocks ------------------------------------------------------------------------------------------------
+
+WINDOW, UNITS = 12, 20
+TARGET = RNG(0).normal(size=(80, WINDOW)).astype(np.float32)
+SOURCE = TARGET[:, ::-1].copy()
+
+
+def small_enhancer():
+    return dense_stack(WINDOW, (WINDOW, UNITS, UNITS, WINDOW), seed=4, name="enhancer")
+
+
+@pytest.fixture(params=[3, 13])
+def blocks(request, monkeypatch):
+    """Sets the number of rows in a block of the widest kernel, none of which divides its 20 rows."""
+    monkeypatch.setattr(fast_keras, "BLOCK_BYTES", 4 * UNITS * request.param)
+
+
+@pytest.mark.parametrize(("batch_size", "rate"), [(20, lambda: keras.optimizers.schedules.CosineDecay(0.003, 20)), (33, lambda: 0.001)])
+def test_it_trains_as_keras_adam_does(blocks, batch_size, rate):
+    network, again, plain = small_enhancer(), small_enhancer(), small_enhancer()
+    assert is_wide_dense_stack(network)
+    for each in (network, again):
+        found = fit_windows(each, SOURCE, TARGET, 3, batch_size, seed=3, learning_rate=rate())
+    plain.compile(keras.optimizers.Adam(rate()), loss="mean_squared_error")
+    orders, losses = RNG(3), []
+    for _ in range(3):
+        order = orders.permutation(len(SOURCE))
+        losses += plain.fit(SOURCE[order], TARGET[order], batch_size, verbose=0, shuffle=False).history["loss"]
+    np.testing.assert_allclose(found, losses, rtol=3e-6)
+    for weight, same, of_plain in zip(network.get_weights(), again.get_weights(), plain.get_weights(), strict=True):
+        np.testing.assert_array_equal(weight, same)
+        np.testing.assert_allclose(weight, of_plain, atol=5e-6)
+    assert np.abs(network.get_weights()[0] - small_enhancer().get_weights()[0]).max() > 1e-3
+
+
+WIDE = {"units": 1_200, "kernel_initializer": "zeros"}
+
+
+@pytest.mark.parametrize(
+    ("layers", "is_wide"),
+    [
+        ([keras.layers.Dense(**WIDE, activation="relu")], True),
+        ([keras.layers.Dense(4, kernel_initializer="zeros")], False),
+        ([keras.layers.Dense(**WIDE, activation="tanh")], False),
+        ([keras.layers.Dense(**WIDE, use_bias=False)], False),
+        ([keras.layers.Dense(**WIDE, kernel_regularizer="l2")], False),
+        ([keras.layers.Dense(**WIDE, trainable=False)], False),
+        ([keras.layers.Dense(**WIDE), keras.layers.Dropout(0.1, seed=0)], False),
+    ],
+)
+def test_only_wide_and_plain_stacks_are_cut(layers, is_wide):
+    assert is_wide_dense_stack(keras.Sequential([keras.Input((1_200,)), *layers])) == is_wide
+
+
+# -- Convolution with its maximum ------------------------------------------------------------------------------------------
+
+SHAPES = [  # rows, samples, width, stride, filters
+    (5, 63, 20, 4, 3),  # three samples that no frame reaches
+    (4, 20, 20, 4, 3),  # a single frame
+    (2, 50, 12, 3, 4),
+    (2, 48, 8, 8, 5),  # frames side by side
+    (3, 31, 6, 1, 2),
+    (23, 60, 20, 4, 7),  # more rows than are computed at a time
+    (2, 500, 20, 4, 500),  # the paper's
+]
+
+
+def of_keras(stride, kept=None, rate=0.0):
+    """Conv1D, Dropout with a given mask, and GlobalMaxPooling1D."""
+
+    def compute(rows, kernel, bias):
+        products = tf.nn.relu(tf.nn.conv1d(rows[:, :, None], kernel[:, None], stride, "VALID") + bias)
+        return tf.reduce_max(products if kept is None else tf.where(kept, products / (1 - rate), 0.0), axis=1)
+
+    return compute
+
+
+def values_and_gradients(compute, inputs, upstream):
+    inputs = [tf.constant(each, tf.float32) for each in inputs]
+
+    @tf.function
+    def run():
+        with tf.GradientTape() as tape:
+            tape.watch(inputs)
+            outputs = compute(*inputs)
+        return outputs, *tape.gradient(outputs, inputs, tf.constant(upstream, tf.float32))
+
+    return [np.asarray(array) for array in run()]
+
+
+def compare(inputs, fast, plain, tolerance=2e-5):
+    """Values and gradients of both, which must be equal."""
+    upstream = RNG(0).integers(-4, 5, (len(inputs[0]), len(inputs[2])))
+    found = [values_and_gradients(compute, inputs, upstream) for compute in (fast, plain)]
+    for mine, theirs in zip(*found, strict=True):
+        np.testing.assert_allclose(mine, theirs, rtol=1e-4, atol=tolerance)
+    return found[0]
+
+
+def fast_of(stride, rate=0.0, seed=None):
+    return lambda rows, kernel, bias: convolution_maximum(rows, kernel, bias, stride, rate, seed)
+
+
+def test_a_convolution_by_hand():
+    # frames [1 2], [0 3], [-1 -9] times the kernel [1 1]: 3, 3, -10, so two winners share the gradient
+    inputs = [[1, 2, 0, 3, -1, -9]], [[1], [1]], [0.5]
+    value, to_rows, to_kernel, to_bias = values_and_gradients(fast_of(2), inputs, [[2]])
+    assert value.tolist() == [[3.5]] and to_rows.tolist() == [[1, 1, 1, 1, 0, 0]]
+    assert to_kernel.tolist() == [[1 * 1 + 1 * 0], [1 * 2 + 1 * 3]] and to_bias.tolist() == [2]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+@pytest.mark.parametrize("has_ties", [False, True])
+def test_values_and_gradients_are_those_of_keras(shape, has_ties):
+    num_rows, samples, width, stride, filters = shape
+    # rows and kernels of -1, 0 and 1: many frames give the same maximum, to the bit in any order of summation
+    draw = (lambda *size: RNG(len(size)).integers(-1, 2, size)) if has_ties else (lambda *size: RNG(len(size)).normal(size=size))
+    outputs, *_ = compare((draw(num_rows, samples), draw(width, filters), draw(filters)), fast_of(stride), of_keras(stride))
+    assert outputs.any()
+
+
+@pytest.mark.parametrize(
+    "inputs", [(np.ones((3, 60)), np.ones((20, 4)), np.full(4, -100)), (np.zeros((2, 40)), np.ones((20, 3)), np.zeros(3))]
+)
+def test_what_does_not_fire_passes_no_gradient(inputs):
+    assert not any(array.any() for array in compare(inputs, fast_of(4), of_keras(4)))
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.95])  # at 0.95 some filters lose every frame
+def test_gradients_with_dropped_products(rate):
+    rng, seed = RNG(0), tf.constant([3, 4])
+    shapes = [tf.TensorShape((number, 11, 14)) for number in (10, 10, 3)]
+    kept = [fast_keras._kept(shape, rate, each) for shape, each in zip(shapes, tf.unstack(tf.random.split(seed, 3)), strict=True)]
+    kept = tf.concat(kept, axis=0)
+    assert np.mean(kept) == pytest.approx(1 - rate, abs=0.05)
+    inputs = [rng.normal(0, 0.3, size) for size in ((23, 63), (20, 14), 14)]
+    compare(inputs, fast_of(4, rate, seed), of_keras(4, kept, rate), 2e-5 / (1 - rate))
+
+
+def small_discriminator(**changed):
+    return of_paper.build_discriminator(tiny_settings(window=63, filters=14, narrow_units=5, **changed))
+
+
+def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
+    rows, trained = tf.constant(RNG(0).normal(0, 0.1, (16, 63, 1)), tf.float32), []
+    for _ in range(2):
+        settings = tiny_settings(window=63, filters=14, narrow_units=5, dropout=0.3, rows=16, fast=True)
+        gan = of_paper.NoiseGAN(of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings)
+        gan.compile()
+        convolution, *_, narrow, _ = gan.discriminator.layers
+        drops = [layer.seed_generator.state for layer in (convolution.dropout, narrow)]
+        before = [each.numpy().copy() for each in drops]
+        gan.train_discriminator(rows, of_paper.labels(16, of_paper.REAL))
+        assert all((old != new.numpy()).any() for old, new in zip(before, drops, strict=True))
+        trained.append([weight.numpy() for weight in gan.discriminator_weights])
+    for one, other in zip(*trained, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(("changed", "kinds"), [({"dropout": 0}, 3), ({"dropout": 0.3}, 4), ({"dropout": 0.3, "stride": 3}, 6)])
+def test_a_width_that_is_no_multiple_of_the_stride_is_left_to_keras(changed, kinds):
+    model = small_discriminator(**changed)
+    fast, rows = with_fast_convolution(model), RNG(0).normal(size=(4, 63, 1)).astype(np.float32)
+    assert len(fast.layers) == kinds and (fast is model) == (kinds == 6)
+    np.testing.assert_allclose(fast(rows), model(rows), rtol=1e-5)
