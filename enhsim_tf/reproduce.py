@@ -25,6 +25,7 @@ examples:
   {PROGRAM} --budget smoke             every step with small counts, written to smoke/
   {PROGRAM} --only fig04               one figure and the stages that it needs
   {PROGRAM} --set dropout=0            another reading of the paper; the decisions page lists all settings
+  {PROGRAM} --telemetry my.csv --column volts --time utc --out my_figures
   {PROGRAM} --store influxdb           with the server given by INFLUXDB_V2_URL, _TOKEN and _ORG
 
 exit code: 0 every measurement lies within its published range, 1 one does not, 2 an input or option cannot be used
@@ -45,6 +46,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of finished stages (default: .cache, or ENHSIM_TF_CACHE)")
     parser.add_argument("--fresh", action="store_true", help="makes all stages again")
+    parser.add_argument("--telemetry", type=Path, metavar="PATH", help="runs the pipeline on a real channel: .npy, .csv or .parquet")
+    parser.add_argument("--column", help="its column with the values")
+    parser.add_argument("--time", help="its column with the timestamps")
     parser.add_argument("--store", default="parquet", metavar="STORE", help="parquet, influxdb, or influxdb://bucket/measurement/field")
     return parser.parse_args(arguments)
 
@@ -60,9 +64,11 @@ def read_settings(options: argparse.Namespace) -> "Settings":
 
 
 def choose_folder(options: argparse.Namespace) -> Path:
-    """The output folder. Only a run of the reference writes to `figures` of its own accord."""
+    """The output folder. Only a run of the reference on the example writes to `figures` of its own accord."""
     default = "smoke" if options.budget == "smoke" else "figures"
-    if options.set:
+    if options.telemetry is not None:
+        default = f"{default}_{options.telemetry.stem}"
+    elif options.set:
         default = f"{default}_changed"
     if options.out is not None and options.budget == "smoke" and options.out.resolve() == Path("figures").resolve():
         raise InputError("Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures.")
@@ -103,6 +109,8 @@ class InfluxTelemetry:
 def run(options: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
     began = time.perf_counter()
+    if options.telemetry is None and (options.column or options.time):
+        raise InputError("Expected --column and --time together with --telemetry. Received: one of them alone.")
     settings, folder = read_settings(options), choose_folder(options)
     store = None if options.store == "parquet" else InfluxTelemetry(options.store)
     folder, cache = make_folder(folder), make_folder(options.cache or default_cache())
@@ -115,7 +123,12 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.paper.report import as_text, read_published, results, write_page
 
     stages = Stages(cache, options.fresh, tell, speaks=True)
-    pipeline = Pipeline(settings, stages, store)
+    if options.telemetry is None:
+        pipeline = Pipeline(settings, stages, store)
+    else:
+        from enhsim_tf.own_channel import OwnChannel
+
+        pipeline = OwnChannel(settings, stages, store, options.telemetry, options.column, options.time)
     chosen = [name for name in FIGURES if options.only in (None, name.split("_")[0])]
     for name in sorted(chosen, key=lambda name: FIGURES[name].needs_training):
         caption = f"seed {options.seed} · {options.budget} budget · {command_line(options, name)}"
@@ -144,14 +157,16 @@ def command_line(options: argparse.Namespace, figure: str = "") -> str:
     words = [] if options.budget == "full" else ["--budget", options.budget]
     words += ["--seed", str(options.seed)] if options.seed else []
     words += [word for text in options.set for word in ("--set", text)]
+    for name in ("telemetry", "column", "time"):
+        words += [f"--{name}", Path(value).name if name == "telemetry" else value] if (value := getattr(options, name)) else []
     words += ["--store", options.store] if options.store != "parquet" else []
     return printable(shlex.join([*PROGRAM.split(), *words, *(["--only", figure.split("_")[0]] if figure else [])]))
 
 
 def conclude(options: argparse.Namespace, different: list[str]) -> int:
     """Tells how the measurements compare with the published ranges, and returns the exit code."""
-    if options.budget == "smoke" or options.set:
-        tell("Published verdicts are those of the reference at full budget; this run is another one.")
+    if options.budget == "smoke" or options.telemetry or options.set:
+        tell("Published verdicts are those of the reference on the paper's example at full budget; this run is another one.")
         return 0
     for line in different:
         tell(f"outside the published range: {line}")

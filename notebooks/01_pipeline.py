@@ -82,8 +82,8 @@ say(
 assert difference < 1e-5
 
 # %% [markdown]
-# For telemetry of your own, the tool (`python -m enhsim_tf fit my.csv`) has a simulator with more choices: it fits the coarse simulator,
-# and chooses the enhancer and the noise model by held-out telemetry.
+# `python -m enhsim_tf.reproduce --telemetry my.csv` runs these steps on telemetry of your own. The tool (`python -m enhsim_tf fit my.csv`)
+# has a simulator with more choices: it fits the coarse simulator, and chooses the enhancer and the noise model by held-out telemetry.
 #
 # **Answer.** One network turns square waves into a waveform, another turns random numbers into noise, and the two are added. This takes for
 # granted that noise does not depend on the signal. Whether the waveform of a fault is right is the question of notebook 23.

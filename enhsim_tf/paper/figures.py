@@ -130,10 +130,11 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     above.plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
     above.plot(window["minutes"], enhanced, color=ENHANCED, linewidth=1.4)
     above.plot(window["minutes"], truth, color=REAL, linewidth=0.8, linestyle=DASHED)
-    label_ends(above, {"coarse": (window["coarse"][0], COARSE), "enhanced": (enhanced, ENHANCED), "true signal": (truth, REAL)})
+    name = "true signal" if pipeline.is_example else "telemetry"
+    label_ends(above, {"coarse": (window["coarse"][0], COARSE), "enhanced": (enhanced, ENHANCED), name: (truth, REAL)})
     below.axhline(0, color=LINE, linewidth=0.6)
     below.plot(window["minutes"], enhanced - truth, color=ENHANCED, linewidth=0.8)
-    beside(below, 0.5, "enhanced\n− true signal", ENHANCED)
+    beside(below, 0.5, f"enhanced\n− {name}", ENHANCED)
     name_axes(np.array([[above], [below]]), FACTS)
     return figure
 

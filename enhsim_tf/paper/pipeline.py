@@ -42,6 +42,9 @@ class Pipeline:
         store: Where the telemetry is placed and read back from; None for a Parquet file in the cache.
     """
 
+    is_example = True  # `own_channel` has another one
+    noise_unit = np.float32(1)  # of the GAN
+
     def __init__(self, settings: Settings, stages: Stages, store: Store | None = None):
         self.settings, self.stages, self.store = settings, stages, store
         # 1: construct lightweight, high-speed simulations
@@ -146,7 +149,7 @@ class Pipeline:
 
     def _train_gan(self, folder: Path) -> None:
         chosen = self.settings
-        real = self.noise_windows("train", chosen.num_windows, "noise windows")
+        real = self.noise_windows("train", chosen.num_windows, "noise windows") / self.noise_unit
         networks = noise.build_generator(chosen), noise.build_discriminator(chosen)
         gan, followed = noise.NoiseGAN(*networks, chosen), []
         gan.compile()
@@ -181,7 +184,7 @@ class Pipeline:
 
     def generate_noise(self, number: int, rng: np.random.Generator) -> np.ndarray:
         """Windows of generated noise, float32 of shape `(number, window)`."""
-        return noise.generate_noise(self.generator, number, self.settings, rng)
+        return self.noise_unit * noise.generate_noise(self.generator, number, self.settings, rng)
 
     # -- Combined ------------------------------------------------------------------------------------------------------
 

@@ -5,11 +5,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from enhsim_tf import reproduce
-from enhsim_tf.paper.claims import CLAIMS, judge_all
+from enhsim_tf.paper.claims import CLAIMS, NOT_MEASURED, judge_all
 from enhsim_tf.paper.figures import FIGURES
+from enhsim_tf.paper.telemetry import ParquetStore
 from tests.paper.conftest import TINY_OPTIONS, tiny_pipeline
 
 ROOT = Path(__file__).parents[2]
@@ -64,6 +67,39 @@ print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} 
 def test_control_characters_reach_neither_caption_nor_results():
     line = reproduce.command_line(reproduce.parse(["--store", "influxdb://a\x1b[31m\u202e/b\nc/d"]))
     assert line.isprintable() and "a?[31m?/b?c/d" in line
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_a_channel_of_ones_own_keeps_its_times_and_is_scaled_by_its_square_wave(tmp_path, kind):
+    times = np.datetime64("2021-03-04T05:06:07") + np.arange(4_000) * np.timedelta64(30, "s")
+    values = np.sin(np.arange(4_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(4_000)
+    table = pd.DataFrame({"utc": times, "volts": values, "amperes": 0.0})
+    table.to_csv(tmp_path / "x.csv", index=False) if kind == "csv" else table.to_parquet(tmp_path / "x.parquet")
+    arguments = ["--telemetry", tmp_path / f"x.{kind}", "--column", "volts", "--time", "utc", "--only", "fig14"]
+    assert reproduce.main([str(each) for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]]) == 0
+    (folder,) = (tmp_path / "cache").iterdir()
+    kept = ParquetStore(folder / "telemetry.parquet").read()
+    assert (kept.start, kept.interval, len(kept.values)) == ("2021-03-04T05:06:07Z", 30, 4_000)
+    slope, offset = np.polyfit(values, kept.values, 1)  # the pipeline's unit is that of the square wave
+    np.testing.assert_allclose(kept.values, slope * values + offset, atol=1e-5)
+
+
+def test_claims_that_need_the_true_signal_are_not_measured_on_a_channel_of_ones_own(tmp_path):
+    np.save(tmp_path / "x.npy", np.sin(np.arange(4_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(4_000))
+    options = [
+        "--budget",
+        "smoke",
+        *TINY_OPTIONS,
+        "--telemetry",
+        tmp_path / "x.npy",
+        "--out",
+        tmp_path / "out",
+        "--cache",
+        tmp_path / "cache",
+    ]
+    assert reproduce.main([str(each) for each in options]) == 0
+    found = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert {claim["id"] for claim in found["claims"] if claim["verdict"] == NOT_MEASURED} == {"C3", "C8", "C9"}
 
 
 @pytest.mark.parametrize(

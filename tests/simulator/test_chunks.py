@@ -15,7 +15,7 @@ def test_generated_windows_do_not_depend_on_the_chunks(mode, monkeypatch):
     simulator, scenario = of_waves(waves, 24), mode and Degraded(mode)
     whole = simulator.generate(23, scenario, seed=5)
     monkeypatch.setattr(module, "_CHUNK_VALUES", 4 * 24 * 2)
-    assert [len(chunk) for chunk in simulator.generate_chunks(23, scenario, seed=5)] == [4] * 5 + [3]
+    assert [len(chunk) for chunk, _ in simulator.generate_labelled_chunks(23, scenario, seed=5)] == [4] * 5 + [3]
     np.testing.assert_allclose(simulator.generate(23, scenario, seed=5), whole, atol=1e-6)
     if mode is None:
         noise = simulator.noise.generate(23, np.random.default_rng([5, 1]))

@@ -59,7 +59,7 @@ def test_a_channel_that_kills_its_worker_is_reported_and_stops_no_other(tmp_path
         tried.append(([job.name for job in jobs], workers))
         for place, job in enumerate(jobs):
             if job.name == "bad":
-                raise ProcessesDiedError("killed", jobs[place : place + 2])
+                raise ProcessesDiedError(jobs[place : place + 2])
             yield fit_many.Outcome(job.name, lines=[job.name])
 
     monkeypatch.setattr(fit_many.engines, "run", run)

@@ -1,0 +1,77 @@
+"""The paper's pipeline on a channel of one's own: `python -m enhsim_tf.reproduce --telemetry`."""
+
+import functools
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
+from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.stages import Stages
+from enhsim_tf.paper.pipeline import VERSION, Pipeline
+from enhsim_tf.paper.settings import Settings
+from enhsim_tf.paper.telemetry import START, ParquetStore, Store, Telemetry
+from enhsim_tf.telemetry.sources import read_telemetry
+
+_FEW, _NUM_OVERLAPPING = 20, 200  # with fewer disjoint windows in a part, so many overlapping ones are compared
+
+
+class OwnChannel(Pipeline):
+    """The paper's pipeline on one channel, in the unit in which its square wave has an amplitude of 1.
+
+    Its signal without noise is unknown, so errors contain the noise, and claims that need the signal are not measured.
+
+    Args:
+        settings: All settings.
+        stages: Keeps the results.
+        store: Where the telemetry is placed and read back from; None for a Parquet file in the cache.
+        path: A table or an array.
+        column: Its column with the values; None if there is one.
+        time: Its column with the times; None: the samples are counted.
+
+    Raises:
+        InputError: If the file cannot be read, no square wave fits, or a part is too short or without noise.
+    """
+
+    is_example = False
+
+    def __init__(self, settings: Settings, stages: Stages, store: Store | None, path: Path, column: str | None, time: str | None):
+        super().__init__(settings, stages, store)
+        read = read_telemetry(path, column, time)
+        wave = SquareWaveSimulator.fit(read.part(0, len(read) // 2))
+        offset, scale = level_offset_and_scale(wave)
+        values, start = ((read.values - offset) / scale).astype(np.float32), (read.start or START).replace("+00:00", "Z")
+        self.own = Telemetry(values, read.interval_s, start, printable(read.name))
+        self.simulator = lambda time: (wave(time + read.offset_s) - offset) / scale
+        self.truth = lambda time: values[np.rint(time / read.interval_s).astype(int)]
+        self.noise_unit = self._noise_unit()
+
+    @functools.cached_property
+    def telemetry(self) -> Telemetry:
+        """The telemetry, read back from the store."""
+        depends = {"name": self.own.name, "checksum": zlib.crc32(self.own.values.tobytes()), "interval": self.own.interval}
+        folder = self.stages.run("telemetry", self._make_telemetry, depends, version=VERSION["telemetry"])
+        kept = ParquetStore(folder / "telemetry.parquet").read()
+        if self.store is None:
+            return kept
+        self.store.write(kept)
+        return self.store.read()
+
+    def _make_telemetry(self, folder: Path) -> None:
+        ParquetStore(folder / "telemetry.parquet").write(self.own)
+
+    def _starts(self, num_samples: int, number: int | None, purpose: str) -> np.ndarray:
+        if number is None and num_samples < _FEW * self.settings.window:
+            return np.unique(np.linspace(0, num_samples - self.settings.window, _NUM_OVERLAPPING).astype(int))
+        return super()._starts(num_samples, number, purpose)
+
+    def _noise_unit(self) -> np.float32:
+        """The unit in which the noise has the standard deviation 0.1, as that of the paper's example."""
+        for name, part in self.parts.items():
+            noise = np.std(self.noise_windows(name), dtype=np.float64)
+            if not noise > 1e-5 * np.std(part.values, dtype=np.float64):  # 32-bit telemetry resolves no less
+                raise InputError(
+                    f"Expected noise around the moving average of {self.own.name}. Received: none in its {name} part. Choose another channel."
+                )
+        return np.float32(10 * np.std(self.noise_windows("train"), dtype=np.float64))
