@@ -10,9 +10,11 @@ import numpy as np
 
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.figure import save
 from enhsim_tf.common.stages import Stages
 from studies.common.replicates import run_study
 from studies.common.settings import Settings
+from studies.spacecraft.channel import CHANNEL, PICTURE, stretches
 from studies.spacecraft.summary import KEPT
 from studies.spacecraft.telemanom import LabelledChannel, load_channel, read_labels
 
@@ -48,7 +50,10 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
                 raise
             return {}
 
-    return run_study("spacecraft", tables_of, channels, options, settings, out, {"skipped": skipped})
+    found = run_study("spacecraft", tables_of, channels, options, settings, out, {"skipped": skipped})
+    if set(channels) - set(skipped) >= {CHANNEL}:
+        save("channel", stretches(load_channel(options.data, CHANNEL)), out, KEPT.command, settings.budget == "smoke", figures=PICTURE)
+    return found
 
 
 def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stages) -> "dict[str, pd.DataFrame]":

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.telemetry.series import Telemetry
 from studies.spacecraft import summary, training_data
 from studies.spacecraft.__main__ import command
+from studies.spacecraft.channel import stretches
 from studies.spacecraft.reference import BOUNDS, NETWORK, RIDGE
 from studies.spacecraft.summary import KEPT
+from studies.spacecraft.telemanom import LabelledChannel
 
 SEQUENCES = {"W-1": [[900, 1099]], "W-2": [[400, 459], [1200, 1259]]}
 NUM_SAMPLES = 1_800  # of a test part
@@ -76,3 +79,16 @@ def test_regression_on_a_wave_that_follows_its_clock_is_as_near_as_the_noise_all
 def test_an_unknown_channel_is_refused(data, tmp_path, capsys):
     assert command(["--data", str(data), "--channels", "W-9", "--out", str(tmp_path), "--cache", str(tmp_path)]) == 2
     assert "Received: 'W-9'" in capsys.readouterr().err
+
+
+def test_stretches_of_the_pictured_channel_have_the_anomaly_in_their_middle_and_the_signal_elsewhere():
+    times = np.arange(8_000)
+    signal = np.sin(2 * np.pi * times / 97) + 0.01 * np.random.default_rng(0).standard_normal(8_000)
+    stuck = np.where((times >= 4_000) & (times < 4_060), 0.0, signal - 0.5)
+    channel = LabelledChannel("x", Telemetry(signal[:2_700].astype(np.float32)), Telemetry(stuck.astype(np.float32)), ((4_000, 4_060),))
+    found = stretches(channel)
+    assert found["anomaly"] == (4_000, 4_060)
+    samples, telemetry, enhanced = found["labelled as anomalous"]
+    assert samples[0] + samples[-1] == pytest.approx(2 * 4_030, abs=2) and np.array_equal(telemetry, channel.test.values[samples])
+    _, telemetry, enhanced = found["later"]
+    assert np.std(telemetry - enhanced) < 0.05  # the noise has 0.01, the level is half a unit lower than what was learnt
