@@ -219,6 +219,7 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
     simulator, report = fit(telemetry, _run_of(job, telemetry), job.options, progress, commands)
     folder = folder_of(job.out, name)
     refuse_foreign(folder)  # checked again, because the fit took time
+    instead = ", in place of the one that was there" if (folder / MANIFEST).is_file() else ""
     found = {"report": report.to_dict(), "cleaning": {channel: cleaned[channel].report.to_dict() for channel in telemetry.columns}}
     with replace_folder(folder) as temporary:
         simulator.save(temporary)
@@ -227,7 +228,7 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
     outcome.reports[name] = found | {"folder": str(folder)}
     here = os.path.relpath(folder)
     shown = folder if here.startswith("..") else here  # from here, its full path if it is elsewhere
-    outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/"]
+    outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/{instead}"]
 
 
 def _run_of(job: Job, telemetry: "Recording") -> "Recording | None":

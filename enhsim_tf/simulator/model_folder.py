@@ -40,10 +40,12 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
     models = Path(os.path.abspath(models))  # so that "." has a name too
     if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
-    found = {
-        urllib.parse.unquote(manifest.parent.name): manifest.parent
-        for manifest in (sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else [])
-    }
+    folders = [manifest.parent for manifest in sorted(models.glob(f"[!.]*/{MANIFEST}"))] if os.path.isdir(models) else []
+    found = {urllib.parse.unquote(folder.name): folder for folder in folders}
+    if len(found) < len(folders):
+        raise InputError(
+            f"Expected one folder for each simulator. Received: two of one name in {printable(str(models))[:200]}. Rename one."
+        )
     if not found:
         raise InputError(
             f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which contains none. Make one with `fit`."

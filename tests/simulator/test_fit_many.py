@@ -39,11 +39,20 @@ def test_all_channels_become_one_simulator_and_one_that_cannot_is_left_out(tmp_p
 def test_separate_simulators_have_the_same_bytes_in_this_process_and_in_another(tmp_path):
     sums = []
     for workers in (0, 1):
-        reports, failed, _ = fitted(tmp_path / str(workers), table(), separately=True, workers=workers)
+        reports, failed, lines = fitted(tmp_path / "both", table(), separately=True, workers=workers)
         assert sorted(reports) == ["volts", "watts"] and not failed
-        folder = tmp_path / str(workers) / "models"
+        folder = tmp_path / "both" / "models"
+        assert sum("in place of the one that was there" in line for line in lines) == 2 * workers
         sums.append([hashlib.sha256((folder / name / "arrays.npz").read_bytes()).hexdigest() for name in ("volts", "watts")])
     assert sums[0] == sums[1]
+
+
+def test_two_folders_of_one_name_are_refused(tmp_path, refused):
+    for name in ("a b", "a%20b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "manifest.json").touch()
+    with refused("two of one name"):
+        models_of(tmp_path)
 
 
 def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
