@@ -26,7 +26,7 @@ from enhsim_tf.common.plot_style import (
 )
 from enhsim_tf.simulator.detector_choice import RATE
 from enhsim_tf.simulator.report import Report
-from enhsim_tf.simulator.scoring import events_table
+from enhsim_tf.simulator.scoring import events_table, told_times
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,8 +98,9 @@ def score_figure(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: st
     number = len(events_table(frame))
     title = f"{drawable(name, 30)}: {number:,} {'event' if number == 1 else 'events'}, {frame['flag'].mean():.1%} of samples flagged"
     subtitle = f"Detector: {frame.attrs['detector']}. Shaded: events. Dashed: threshold."
-    rows, has_time = len(channels) + 1, hasattr(frame.index, "tz")
-    times = frame.index.tz_convert(None) if has_time and frame.index.tz is not None else frame.index
+    rows, times = len(channels) + 1, told_times(frame.index)
+    has_time = hasattr(times, "tz")
+    times = times.tz_convert(None) if has_time and times.tz is not None else times
     with matplotlib.style.context(STYLE):
         figure, down = new_sheet(DOUBLE, 1.0 + 1.15 * rows, title, subtitle)
         axes = panels(figure, down + 0.2, rows, 1, sharex=True)[:, 0]
@@ -123,7 +124,7 @@ def score_figure(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: st
             locator = matplotlib.dates.AutoDateLocator(minticks=3, maxticks=7)
             axes[-1].xaxis.set_major_locator(locator)
             axes[-1].xaxis.set_major_formatter(matplotlib.dates.ConciseDateFormatter(locator))
-        axes[-1].set_xlabel("time (UTC)" if has_time else "sample")
+        axes[-1].set_xlabel("time (UTC)" if has_time else "time (s)" if hasattr(frame.index, "tz") else "sample")
         _foot(figure, f"enhsim-tf score · {len(frame):,} samples")
     return figure
 

@@ -268,9 +268,11 @@ def _note(frame: "pd.DataFrame", scorer: Scorer, edges: Sequence[int], departure
     frame.attrs["events"] = event_rows(frame["score"].to_numpy(), edges, nominal, scorer.window, interval_s, since)
     frame.attrs["departure"] = ""
     if departure is not None:
+        when = told_times(frame.index[[since]])[0]
         frame.attrs["departure"] = (
-            f"since {frame.index[since]} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a "
-            "lasting fault, or the new normal: then go on with `update`. score_after are scores against the new operating point."
+            f"since {f'{when:.10g} s' if isinstance(when, float) else when} the telemetry has left what was learnt and stays there "
+            f"({', '.join(departure.what)}): one event. It is a lasting fault, or the new normal: then go on with `update`. score_after are "
+            "scores against the new operating point."
         )
 
 
@@ -302,6 +304,15 @@ def event_rows(
     ]
 
 
+def told_times(index: "pd.Index") -> "pd.Index":
+    """Returns the times as they are written: those in 1970 come from a clock that counts from zero, and are seconds again."""
+    import pandas as pd
+
+    if not isinstance(index, pd.DatetimeIndex) or not len(index) or index[0].year != 1970:
+        return index
+    return pd.Index((index - pd.Timestamp(0, tz=index.tz)) / pd.Timedelta(seconds=1), name=index.name)
+
+
 def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
     """Returns the events in scores, one row per alarm.
 
@@ -322,7 +333,8 @@ def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
         after = index[begin] + pd.to_timedelta(table["duration_s"].to_numpy(float), unit="s").round("us")
     else:
         after = index[end - 1] + 1
-    return table.assign(begin=index[begin], end=after, peak=index[table["peak"].to_numpy(int)])
+    places = {"begin": index[begin], "end": after, "peak": index[table["peak"].to_numpy(int)]}
+    return table.assign(**{name: told_times(place) for name, place in places.items()})
 
 
 def events_path(path: str | os.PathLike) -> Path:
@@ -334,9 +346,9 @@ def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
     """Writes what `score` returns to a `.parquet` or `.csv` file, and the events to `events_path`. Both files appear when they are complete."""
     with replace_file(path) as temporary, replace_file(events_path(path)) as events:
         events_table(frame).to_csv(events, index=False)
+        plain = frame.set_axis(told_times(frame.index))
+        plain.attrs = {}  # Parquet would store them as JSON
         if Path(path).suffix == ".csv":
-            frame.to_csv(temporary)
+            plain.to_csv(temporary)
         else:
-            plain = frame.copy(deep=False)
-            plain.attrs = {}  # Parquet would store them as JSON
             plain.to_parquet(temporary, index=True)  # sample numbers, too, are a column for every reader

@@ -69,6 +69,17 @@ def test_scores_and_events_are_written_together(single, telemetry, tmp_path):
     assert pd.Timestamp(events["begin"][0]) < pd.Timestamp("2024-01-01T02:50:00Z") < pd.Timestamp(events["end"][0])
 
 
+def test_times_of_a_clock_from_zero_are_written_as_seconds(single, telemetry, tmp_path):
+    values = changed(telemetry, 1_500, 3_000, 6.0)
+    frame = score(single[0], dataclasses.replace(values, start="1970-01-01T00:00:00+00:00"))
+    write_scores(tmp_path / "scores.csv", frame)
+    written, events = pd.read_csv(tmp_path / "scores.csv"), pd.read_csv(tmp_path / "scores.events.csv")
+    assert written["time"].tolist() == [10.0 * number for number in range(3_000)]
+    last = frame.attrs["events"][-1]
+    assert events.iloc[-1][["begin", "end"]].tolist() == [10 * last["begin"], 30_000]
+    assert f"since {10 * last['begin']} s" in frame.attrs["departure"]
+
+
 def test_a_lasting_change_is_one_event_since_its_time_and_names_update(single, telemetry):
     values = changed(telemetry, 1_500, 3_000, 6.0).parts[0].values
     parts = Run(values[:1_200]), Run(values[1_200:], 13_000.0)  # after a gap of a hundred samples
