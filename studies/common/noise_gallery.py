@@ -13,7 +13,6 @@ import numpy as np
 from studies.common.noise_processes import NOISES, NoiseProcess, first_order
 
 LOOKED_AT = ("white", "autoregressive", "heteroscedastic", "shot", "fractional", "heavy_tails", "one_over_f")
-UNSEEN = ("interference", "telegraph", "quantised", "bursts", "loudness", "signal_dependent", "bernoulli")
 
 
 @dataclass(frozen=True)

@@ -55,52 +55,6 @@ def mean_interval(values: "pd.Series", factors: Sequence[str] = ("environment", 
     return {"mean": float(numbers.mean()), "low": low, "high": high}
 
 
-def wilcoxon_signed_rank(differences: np.ndarray) -> float:
-    """Two-sided p-value of the Wilcoxon signed-rank test that paired differences are symmetric around zero.
-
-    The test is exact with and without ties: it enumerates all signs.
-
-    Args:
-        differences: One difference for each replicate, shape `(replicates,)`; zeros are ignored, as in Wilcoxon's original test.
-
-    Returns:
-        The p-value; 1 if all differences are zero.
-
-    Raises:
-        InputError: If there is no difference or one is not finite.
-    """
-    from scipy.stats import rankdata
-
-    differences = np.asarray(differences, np.float64)
-    if differences.ndim != 1 or not len(differences) or not np.isfinite(differences).all():
-        raise InputError(f"Expected finite differences of shape (replicates,). Received: {differences}.")
-    differences = differences[differences != 0]
-    # scipy.stats.wilcoxon counts ties out up to 13 differences and takes a normal law beyond: of 20 that all are 1 it has a p-value of
-    # 7.7e-6 for 2 / 2^20 = 1.9e-6, of 40 one that is 140 times too large. Without ties the two agree.
-    ranks = np.rint(2 * rankdata(np.abs(differences))).astype(int)  # doubled: those of ties are halves
-    chance = np.zeros(ranks.sum() + 1)  # of each sum of the ranks with a plus
-    chance[0] = 1
-    for rank in ranks:
-        chance = (chance + np.concatenate([np.zeros(rank), chance[:-rank]])) / 2
-    found = ranks[differences > 0].sum()
-    return float(min(1, 2 * chance[: found + 1].sum(), 2 * chance[found:].sum()))
-
-
-def holm(p_values: Sequence[float]) -> np.ndarray:
-    """P-values adjusted by Holm's step-down method. Below 0.05, the probability of any false positive is at most 5 %.
-
-    Raises:
-        InputError: If one is not from 0 to 1.
-    """
-    p_values = np.asarray(p_values, np.float64)
-    if p_values.ndim != 1 or not np.all((p_values >= 0) & (p_values <= 1)):
-        raise InputError(f"Expected p-values from 0 to 1, of shape (tests,). Received: {p_values}.")
-    order = np.argsort(p_values, kind="stable")
-    adjusted = np.empty(len(p_values))
-    adjusted[order] = np.minimum(np.maximum.accumulate(p_values[order] * np.arange(len(p_values), 0, -1)), 1)
-    return adjusted
-
-
 def t_interval(values: "pd.Series", level: float = 0.95) -> dict[str, float | None]:
     """The mean of independent values with Student's interval, which has its coverage also for few values if they are normal.
 

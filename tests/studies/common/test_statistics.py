@@ -1,13 +1,11 @@
 """Tests intervals and tests against hand-worked cases, closed forms, SciPy, and coverage in simulations with a known mean."""
 
-import itertools
-
 import numpy as np
 import pandas as pd
 import pytest
 import scipy.stats
 
-from studies.common.statistics import holm, mean_interval, t_interval, wilcoxon_signed_rank
+from studies.common.statistics import mean_interval, t_interval
 
 
 def half_width(interval):
@@ -52,50 +50,6 @@ def test_intervals_refuse_what_is_not_crossed(refused):
         mean_interval(values.where([True, False, True, True]))
     with refused("0 to 0 rows"):
         mean_interval(values[:0])
-
-
-def test_holm_by_hand():
-    np.testing.assert_allclose(holm([0.01, 0.04, 0.03]), [0.03, 0.06, 0.06])  # 3 x 0.01, 2 x 0.03, then never below it
-    np.testing.assert_allclose(holm([0.6, 0.7, 0.001, 0.02]), [1, 1, 0.004, 0.06])
-    np.testing.assert_allclose(holm([0.2]), [0.2])
-
-
-def test_holm_refuses_what_is_no_probability(refused):
-    for p_values in ([0.1, 1.2], [np.nan], [-0.1]):
-        with refused("p-values"):
-            holm(p_values)
-
-
-@pytest.mark.parametrize("number", [5, 10, 23, 40])
-def test_signed_ranks_as_scipy_counts_them(number):
-    differences = np.random.default_rng(number).standard_normal(number) + 0.3
-    assert wilcoxon_signed_rank(differences) == pytest.approx(scipy.stats.wilcoxon(differences, method="exact").pvalue, rel=1e-9)
-
-
-def test_signed_ranks_with_ties_by_counting_all_signs():
-    differences = np.array([1.0, -1.0, 2.0, 2.0, 2.0, -3.0, 4.0, 0.0, 4.0])
-    sizes = np.abs(differences[differences != 0])
-    ranks = scipy.stats.rankdata(sizes)
-    sums = np.array([ranks[list(signs)].sum() for signs in itertools.product([False, True], repeat=8)])
-    found = ranks[differences[differences != 0] > 0].sum()
-    expected = 2 * min(np.mean(sums <= found), np.mean(sums >= found))
-    assert wilcoxon_signed_rank(differences) == pytest.approx(expected)
-    assert wilcoxon_signed_rank(-differences) == pytest.approx(expected)
-
-
-def test_the_least_p_values_that_few_replicates_can_reach():
-    assert wilcoxon_signed_rank(np.arange(1.0, 11)) == pytest.approx(0.001953125)  # 2 / 2^10
-    assert wilcoxon_signed_rank(-np.arange(1.0, 6)) == pytest.approx(0.0625)
-    for number in (5, 10, 20, 40):  # ties leave it what it is, also where SciPy takes a normal law
-        assert wilcoxon_signed_rank(np.ones(number)) == pytest.approx(2 / 2**number, rel=1e-9)
-    assert wilcoxon_signed_rank(np.zeros(4)) == 1
-    assert wilcoxon_signed_rank([1.0, -1.0]) == 1
-
-
-def test_signed_ranks_refuse_what_is_missing(refused):
-    for differences in ([], [1.0, np.nan]):
-        with refused("differences"):
-            wilcoxon_signed_rank(differences)
 
 
 def test_students_interval_as_scipy_has_it():
