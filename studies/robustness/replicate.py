@@ -133,4 +133,4 @@ class Replicate:
         number = self.settings.paper.num_windows
         learnt, others = (self.example.windows("train", number, each) for each in ("training windows", "residual windows"))
         ridge = fit_ridge(learnt["coarse"], learnt["target"], learnt["start"])
-        return ridge, WindowBootstrap.fit(others["target"] - ridge.predict(others["coarse"]))
+        return ridge, WindowBootstrap(others["target"] - ridge.predict(others["coarse"]))
