@@ -1,17 +1,17 @@
 """The paper's pipeline on a channel of one's own: `python -m enhsim_tf.reproduce --telemetry`."""
 
-import functools
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.paper.pipeline import VERSION, Pipeline
+from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.settings import Settings
-from enhsim_tf.paper.telemetry import START, ParquetStore, Store, Telemetry
+from enhsim_tf.paper.telemetry import START, Store, Telemetry
 from enhsim_tf.telemetry.sources import read_telemetry
 
 _FEW, _NUM_OVERLAPPING = 20, 200  # with fewer disjoint windows in a part, so many overlapping ones are compared
@@ -47,19 +47,14 @@ class OwnChannel(Pipeline):
         self.truth = lambda time: values[np.rint(time / read.interval_s).astype(int)]
         self.noise_unit = self._noise_unit()
 
-    @functools.cached_property
-    def telemetry(self) -> Telemetry:
-        """The telemetry, read back from the store."""
-        depends = {"name": self.own.name, "checksum": zlib.crc32(self.own.values.tobytes()), "interval": self.own.interval}
-        folder = self.stages.run("telemetry", self._make_telemetry, depends, version=VERSION["telemetry"])
-        kept = ParquetStore(folder / "telemetry.parquet").read()
-        if self.store is None:
-            return kept
-        self.store.write(kept)
-        return self.store.read()
+    @property
+    def telemetry_settings(self) -> dict[str, Any]:
+        """What the telemetry depends on."""
+        return {"name": self.own.name, "checksum": zlib.crc32(self.own.values.tobytes()), "interval": self.own.interval}
 
-    def _make_telemetry(self, folder: Path) -> None:
-        ParquetStore(folder / "telemetry.parquet").write(self.own)
+    def new_telemetry(self) -> Telemetry:
+        """The telemetry before it is placed in the store."""
+        return self.own
 
     def _starts(self, num_samples: int, number: int | None, purpose: str) -> np.ndarray:
         if number is None and num_samples < _FEW * self.settings.window:

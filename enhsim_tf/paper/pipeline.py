@@ -7,6 +7,7 @@ import functools
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +62,7 @@ class Pipeline:
     @functools.cached_property
     def telemetry(self) -> Telemetry:
         """The telemetry, read back from the store."""
-        folder = self.stages.run("telemetry", self._make_telemetry, self.settings.of("telemetry"), version=VERSION["telemetry"])
+        folder = self.stages.run("telemetry", self._make_telemetry, self.telemetry_settings, version=VERSION["telemetry"])
         kept = ParquetStore(folder / "telemetry.parquet")
         if self.store is None:
             return kept.read()
@@ -69,7 +70,16 @@ class Pipeline:
         return self.store.read()
 
     def _make_telemetry(self, folder: Path) -> None:
-        ParquetStore(folder / "telemetry.parquet").write(make_telemetry(self.settings, self.draw("telemetry")))
+        ParquetStore(folder / "telemetry.parquet").write(self.new_telemetry())
+
+    @property
+    def telemetry_settings(self) -> dict[str, Any]:
+        """What the telemetry depends on."""
+        return self.settings.of("telemetry")
+
+    def new_telemetry(self) -> Telemetry:
+        """The telemetry before it is placed in the store."""
+        return make_telemetry(self.settings, self.draw("telemetry"))
 
     @functools.cached_property
     def parts(self) -> dict[str, Telemetry]:

@@ -269,8 +269,9 @@ def _note(frame: "pd.DataFrame", scorer: Scorer, edges: Sequence[int], departure
     frame.attrs["departure"] = ""
     if departure is not None:
         when = told_times(frame.index[[since]])[0]
+        when = f"{when:.10g} s" if isinstance(when, float) else when
         frame.attrs["departure"] = (
-            f"since {f'{when:.10g} s' if isinstance(when, float) else when} the telemetry has left what was learnt and stays there "
+            f"since {when} the telemetry has left what was learnt and stays there "
             f"({', '.join(departure.what)}): one event. It is a lasting fault, or the new normal: then go on with `update`. score_after are "
             "scores against the new operating point."
         )

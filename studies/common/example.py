@@ -1,7 +1,7 @@
 """The paper's pipeline on its example with other kinds of noise, and its parts as the tool takes them."""
 
 import functools
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.paper import settings as of_paper
 from enhsim_tf.paper import telemetry as of_example
-from enhsim_tf.paper.pipeline import VERSION, Pipeline
+from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.telemetry.series import Telemetry
 from studies.common.noise_gallery import GALLERY
 from studies.common.settings import Settings
@@ -55,20 +55,19 @@ class Example(Pipeline):
         super().__init__(settings.paper, stages)
         self.noise, self.coarse = settings.noise, coarse_simulator(settings.paper)
 
-    @functools.cached_property
-    def telemetry(self) -> of_example.Telemetry:
-        """The telemetry; with white noise it is the paper's."""
-        if self.noise == "white":
-            return super().telemetry
-        depends = self.settings.of("telemetry") | {"noise": self.noise}
-        folder = self.stages.run("telemetry", self._make_telemetry, depends, version=VERSION["telemetry"])
-        return of_example.ParquetStore(folder / "telemetry.parquet").read()
+    @property
+    def telemetry_settings(self) -> dict[str, Any]:
+        """What the telemetry depends on; with white noise it is the paper's."""
+        return super().telemetry_settings | ({} if self.noise == "white" else {"noise": self.noise})
 
-    def _make_telemetry(self, folder: Path) -> None:
+    def new_telemetry(self) -> of_example.Telemetry:
+        """The telemetry before it is placed in the store."""
+        if self.noise == "white":
+            return super().new_telemetry()
         chosen = self.settings
         clean = self.truth(chosen.interval * np.arange(chosen.num_samples))
         noisy = clean + draw_noise(self.noise, clean, chosen.noise_sd, self.draw("telemetry"))
-        of_example.ParquetStore(folder / "telemetry.parquet").write(of_example.Telemetry(noisy.astype(np.float32), chosen.interval))
+        return of_example.Telemetry(noisy.astype(np.float32), chosen.interval)
 
     @functools.cached_property
     def train(self) -> Telemetry:
