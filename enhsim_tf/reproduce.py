@@ -28,6 +28,8 @@ examples:
   {PROGRAM} --telemetry my.csv --column volts --time utc --out my_figures
   {PROGRAM} --store influxdb           with the server given by INFLUXDB_V2_URL, _TOKEN and _ORG
 
+further experiments are studies with commands of their own: python -m studies.robustness, and others in studies/
+
 exit code: 0 every measurement lies within its published range, 1 one does not, 2 an input or option cannot be used
 """
 

@@ -206,7 +206,7 @@ rates, recall = (
 colors = {"coarse": COARSE, "enhanced": ENHANCED, "enhanced + GAN noise": GENERATED, "real": REAL}
 alt = "False-alarm rate and recall of three detectors by the data they were trained on"
 too_many = int((rates["enhanced + GAN noise"] > 0.1).sum())
-title = f"Trained on the paper's noise, {too_many} of {len(detectors)} detectors take nominal telemetry for anomalies"
+title = f"{too_many} of {len(detectors)} detectors trained on the paper's noise flag nominal telemetry"
 with drawing(alt, 2, 2.6, title, sharey=True) as panels:
     shown = {"false alarms: share of nominal windows": rates, "recall: share of faulty windows": recall}
     for panel, (name, shares) in zip(panels, shown.items()):

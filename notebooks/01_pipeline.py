@@ -53,7 +53,7 @@ say(f"{telemetry.shape[0]} windows of {telemetry.shape[1]} samples, as {telemetr
 
 # %%
 alt = "One window on its way through the pipeline: coarse, enhanced, noise and their sum"
-title = "Waveform and noise are made apart, and meet only where they are added"
+title = "Waveform and noise are made apart and meet in the sum"
 parts = {
     "coarse": (coarse, COARSE),
     "enhanced": (clean, ENHANCED),

@@ -97,7 +97,7 @@ assert abs(error - closed_form) < 0.01
 x = np.linspace(0, 1, 100_001)
 alt = "The mean square error of a square wave for a sine, by the height of the square wave"
 best_height = 2 / np.pi
-title = f"A square wave as high as the sine is not the best one; {best_height:.2f} of that height is best"
+title = f"The best square wave has {best_height:.2f} of the height of the sine"
 heights = np.linspace(0, 1.2, 121)
 by_height = [np.sqrt(np.mean((h - np.sin(np.pi * x)) ** 2) * 2) for h in heights]
 with drawing(alt, 2, 2.1, title) as panels:

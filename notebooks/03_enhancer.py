@@ -130,7 +130,7 @@ assert abs((of_target - of_truth) / variance - 1) < 0.05
 above = history["val_loss"][-1] / variance - 1
 epochs = np.arange(1, len(history["loss"]) + 1)
 alt = "Training and held-out loss of the enhancer by epoch, and the variance of the noise"
-title = f"After {len(epochs)} epochs, the held-out loss is {above:.0%} above the variance of the noise"
+title = f"The held-out loss ends {above:.0%} above the variance of the noise"
 with drawing(alt, height=2.3, title=title) as panel:
     panel.plot(epochs, history["loss"], color=ENHANCED, linestyle=DASHED, label="training windows")
     panel.plot(epochs, history["val_loss"], color=ENHANCED, label="held-out windows")

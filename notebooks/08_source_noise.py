@@ -116,9 +116,7 @@ piece = values[: 500 + 242]
 
 def draw(width):
     half, extracted = width // 2, extract(values[:100_000], width)
-    title = (
-        f"Width {width}: the noise has a standard deviation of {extracted.std():.3f}; {true_sd} was put in"
-    )
+    title = f"Width {width}: a standard deviation of {extracted.std():.3f}; {true_sd} was put in"
     with drawing(
         f"Telemetry, its moving average over {width} samples, and the rest", 2, 1.9, title
     ) as panels:
@@ -141,7 +139,7 @@ widths = np.arange(3, 122, 2)
 measured = np.array([extract(values[:50_000], each).std() for each in widths])
 predicted = np.array([predicted_sd(each) for each in widths])
 alt = "Standard deviation of the extracted noise by the width of the moving average, measured and predicted"
-title = "A narrow average removes noise, and a wide one adds a part of the wave"
+title = "A narrow average removes noise; a wide one adds the wave"
 with drawing(alt, height=2.1, title=title) as panel:
     panel.plot(widths, predicted, color=AVERAGE, label="predicted")
     panel.plot(widths[::3], measured[::3], "o", color=REAL, markersize=2.5, label="measured")

@@ -141,7 +141,7 @@ shares = {name: shares_of_variance(windows) for name, windows in parts.items()}
 
 # %%
 alt = "Share of the variance by dimension, sorted: real noise, generated noise, and the same before the tanh"
-title = "Generated noise fills few dimensions: before the tanh exactly 64, real noise all 500"
+title = "Generated noise fills 64 dimensions before the tanh, real noise all 500"
 styles = ((REAL, "-"), (GENERATED, DASHED), (GENERATED, ":"))
 with drawing(alt, height=2.3, title=title) as panel:
     for (name, values), (color, style) in zip(shares.items(), styles):

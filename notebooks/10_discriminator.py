@@ -161,7 +161,7 @@ judged = {name: probability_real(windows) for name, windows in changed.items()}
 
 # %%
 alt = "Judgement of real windows as recorded and after each of three changes: points near the diagonal are windows judged alike"
-title = "The discriminator judges a window almost as before if its pieces stay whole"
+title = "While pieces stay whole, the discriminator judges a window almost as before"
 with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
     for panel, (name, other) in zip(panels, judged.items()):
         panel.plot(recorded, other, "o", color=REAL, markersize=2, alpha=0.4)
@@ -215,7 +215,7 @@ floors = {name: judge(more_real, held_out) for name, judge in judges.items()}
 
 # %%
 alt = "AUC of three judges that tell the noise of the GAN from real noise, each with its floor"
-title = "Two simple judges tell generated noise from real noise; the discriminator does not"
+title = "Two simple judges recognise generated noise; the discriminator does not"
 with drawing(alt, height=1.7, title=title) as panel:
     bars = panel.barh(
         list(found), list(found.values()), 0.55, color=GENERATED, label="generated against real"

@@ -161,7 +161,7 @@ share = {iteration: windows.std(dtype=float) / real_sd for iteration, windows in
 
 # %%
 def draw(iteration):
-    title = f"After {iteration} iterations, the generated noise has {share[iteration]:.2f} times the real standard deviation"
+    title = f"After {iteration} iterations: {share[iteration]:.2f} times the real standard deviation"
     with drawing(
         f"Real and generated noise after {iteration} iterations", 2, 1.7, title, sharey=True
     ) as panels:

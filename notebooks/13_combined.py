@@ -168,7 +168,7 @@ np.testing.assert_allclose(
 
 # %%
 alt = "False-alarm rate of the PCA residual on real nominal telemetry, by the data that it was trained on"
-title = "The sum looks right, but a detector trained on it takes real telemetry for anomalies"
+title = "The sum looks right, but detectors trained on it flag real telemetry"
 colors = {"coarse": COARSE, "enhanced": ENHANCED, "enhanced + GAN noise": GENERATED, "real": REAL}
 with drawing(alt, height=1.9, title=title) as panel:
     bars = panel.barh(list(rates), list(rates.values()), color=[colors.get(kind, QUIET) for kind in rates])
@@ -229,9 +229,7 @@ def draw(scale):
     limit = (
         own.max() if np.isinf(limit) else limit
     )  # few windows, as at smoke budget, allow no threshold of 1 %
-    title = (
-        f"{scale} times the real noise: {np.mean(of_real > limit):.1%} of real nominal windows raise an alarm"
-    )
+    title = f"{scale} times the real noise: {np.mean(of_real > limit):.1%} of real windows raise an alarm"
     bins = np.linspace(min(own.min(), of_real.min()), max(own.max(), of_real.max()), 80)
     with drawing(f"Scores with noise of {scale} times the real scale", height=1.6, title=title) as panel:
         panel.hist(own, bins, color=ENHANCED, alpha=0.5, label="same kind")

@@ -171,7 +171,7 @@ losses = {
     "named weights: it learns": np.array(named_losses),
 }
 alt = "Loss of the discriminator on real and generated noise: the classic pattern, and named weights"
-title = "In both ways the loss on generated noise moves, but only on the right the discriminator learns"
+title = "The loss on generated noise always moves; only the right-hand discriminator learns"
 with drawing(alt, 2, 2.4, title, sharey=True) as panels:
     for panel, (name, curves) in zip(panels, losses.items()):
         panel.plot(curves[:, 0], color=REAL, label="real noise")

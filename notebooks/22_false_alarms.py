@@ -124,7 +124,7 @@ alarms = {name: np.mean(of_healthy[name] > threshold[name]) for name in arms}
 # %%
 least = 1e-5  # scores of the noiseless truth are nearly 0, which a logarithmic axis cannot show
 alt = "Range of the scores of real nominal windows and the threshold of the arm, for six arms"
-title = "Real windows score alike in every row; the threshold, set by the arm's own windows, does not"
+title = "Real windows score alike in every row; the threshold differs"
 with drawing(alt, height=2.2, title=title) as panel:
     for place, name in enumerate(arms):
         panel.plot(np.quantile(of_healthy[name], [0.01, 0.99]), [place] * 2, color=REAL, linewidth=4)
@@ -176,7 +176,7 @@ for factor in factors:
     limit = threshold_for(scores_of(detector, second + factor * noise_sd * noises[1]))
     by_factor[factor] = np.mean(scores_of(detector, healthy) > limit)
 
-title = "The standard deviation of the training noise must be right to a few per cent"
+title = "A few per cent in the noise's scale decide the false alarms"
 with drawing("False alarms over the scale of the training noise", height=2.0, title=title) as panel:
     panel.plot(factors, [100 * rate for rate in by_factor.values()], "o-", color=AVERAGE, markersize=4)
     panel.axhline(1, color=QUIET, linewidth=0.8)

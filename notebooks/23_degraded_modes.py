@@ -43,7 +43,7 @@ median = {name: np.median(values) for name, values in error.items()}
 
 # %%
 alt = "Coarse, enhanced and true signal of one window: nominal, stuck and drifting"
-title = f"The error is {median['nominal']:.2f} on nominal windows, {median['stuck']:.2f} when stuck, {median['drift']:.2f} with a drift"
+title = f"Error: {median['nominal']:.2f} on nominal windows, {median['stuck']:.2f} when stuck, {median['drift']:.2f} with a drift"
 with drawing(alt, 3, 2.2, title, sharey=True) as panels:
     for panel, (name, (coarse, truth)) in zip(panels, pairs.items()):
         panel.plot(coarse[0], color=COARSE, linewidth=0.8, label="coarse")
@@ -114,9 +114,7 @@ scores = {name: out_of_range(coarse) for name, (coarse, _) in pairs.items()}
 flagged = {name: np.mean(values > limit) for name, values in scores.items()}
 
 alt = "Error of each enhanced window against the out-of-range score of its coarse window: nominal, stuck and drifting"
-title = (
-    f"{flagged['stuck']:.0%} of the stuck and {flagged['drift']:.0%} of the drifting windows are out of range"
-)
+title = f"Out of range: {flagged['stuck']:.0%} of stuck and {flagged['drift']:.0%} of drifting windows"
 with drawing(alt, height=2.4, title=title) as panel:
     for name, color, marker in zip(pairs, (REAL, QUIET, COARSE), "o^s"):
         panel.plot(scores[name], error[name], marker, color=color, markersize=2, label=name)
@@ -152,7 +150,7 @@ def draw(severity):
     coarse, truth = degraded(pipeline, "stuck", severity)
     estimate = pipeline.enhance(coarse)
     share, now = np.mean(out_of_range(coarse) > limit), np.median(errors_of(estimate, truth))
-    title = f"Stuck for {severity:.0%} of the time: error {now:.2f}, {share:.0%} of the windows out of range"
+    title = f"Stuck for {severity:.0%} of the time: error {now:.2f}, {share:.0%} out of range"
     with drawing(f"A window that is stuck at severity {severity}", height=1.7, title=title) as panel:
         panel.plot(coarse[0], color=COARSE, linewidth=0.8, label="coarse")
         panel.plot(truth[0], color=REAL, linestyle=DASHED, label="true")
@@ -207,7 +205,7 @@ table["coarse simulator"] = [mean_error(lambda windows: windows, severity) for s
 
 # %%
 alt = "Error on faults, mean over six modes, by severity: coarse, network, ridge, and ridge trained on faults"
-title = "Training on simulated faults keeps the error below that of the coarse simulator"
+title = "Trained on simulated faults, ridge regression stays below the coarse simulator"
 styles = {"coarse simulator": (COARSE, "-"), "network, nominal": (ENHANCED, "-")}
 styles |= {"ridge, nominal": (QUIET, DASHED), "ridge, nominal and faults": (REAL, ":")}
 with drawing(alt, height=2.4, title=title) as panel:

@@ -128,10 +128,7 @@ curves = {
 def draw(exponent):
     at = {unit: float(np.interp(exponent, np.log10(penalties), values)) for unit, values in curves.items()}
     winners = [unit for unit, error in at.items() if error < errors["network of the paper"]]
-    title = (
-        f"Penalty 10^{exponent:g}: error {at['volts']:.3f} in volts and {at['kilovolts']:.3f} in kilovolts; ridge regression beats "
-        f"the network in {' and in '.join(winners) or 'neither'}"
-    )
+    title = f"Penalty 10^{exponent:g}: ridge regression beats the network in {' and in '.join(winners) or 'neither'}"
     alt = (
         "Error of ridge regression on held-out windows over the penalty, for inputs in volts and in kilovolts"
     )
@@ -223,7 +220,7 @@ first, last, (inputs, targets, _, new_inputs, new_targets, _) = split(heater(num
 alt = "Ten windows of the heater: coarse and real, over time"
 stretch = slice(2_000, 3_000)
 coarse_run, real_run, _ = heater(num_samples, 0.5)
-title = f"The coarse run has an error of {nrmse(coarse_run, real_run):.0%} of the signal's deviation: it misses the square and the drift"
+title = f"The coarse run misses the square and the drift (error {nrmse(coarse_run, real_run):.0%})"
 with drawing(alt, height=1.8, title=title) as panel:
     panel.plot(coarse_run[stretch], color=COARSE, linewidth=0.9, label="coarse simulator")
     panel.plot(real_run[stretch], color=REAL, linewidth=0.8, label="telemetry")

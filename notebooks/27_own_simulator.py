@@ -39,7 +39,7 @@ error = np.sqrt(np.mean((inputs["volts"] - target) ** 2)) / np.std(target)
 with drawing(
     "Voltage of the battery as measured and as simulated, over three hours",
     height=2.2,
-    title=f"The coarse simulator has the timing of the telemetry, but its error is {error:.0%} of the signal's deviation",
+    title=f"The coarse simulator has the timing, but an error of {error:.0%}",
 ) as panel:
     panel.plot(hours, target[:1_200], color=REAL, linewidth=0.8, label="telemetry")
     panel.plot(hours, inputs["volts"][:1_200], color=COARSE, linestyle=DASHED, label="coarse simulator")
@@ -241,8 +241,7 @@ alarms = {
 with drawing(
     "Root mean square of the residual over the run with the fault, beside the enhanced and the coarse planned run",
     height=2.3,
-    title=f"The enhanced planned run finds {alarms['enhanced run'][1]:.0%} of the fault's windows, the coarse one "
-    f"{alarms['coarse run'][1]:.0%}",
+    title=f"The enhanced run finds {alarms['enhanced run'][1]:.0%} of the fault, the coarse one {alarms['coarse run'][1]:.0%}",
 ) as panel:
     time_h = (places + 30) * model.interval_s / 3_600
     for name, color, style in (("coarse run", COARSE, DASHED), ("enhanced run", ENHANCED, "-")):

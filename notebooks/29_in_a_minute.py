@@ -104,7 +104,7 @@ for name, windows in kinds.items():
     threshold, _ = finite_threshold(detector.score(windows[number:]), 0.01)
     alarms[name] = np.mean(detector.score(test["target"]) > threshold)
 
-title = "A detector that learns the GAN's noise takes most telemetry for an anomaly"
+title = "A detector that learns the GAN's noise flags most telemetry"
 with drawing("False alarms by training data", height=1.7, title=title) as panel:
     colors = [ENHANCED, GENERATED, QUIET, REAL]
     bars = panel.barh(list(alarms), list(alarms.values()), color=colors)

@@ -92,7 +92,7 @@ assert abs(correlations["drawn jointly"] - correlations["real"]) < 0.1
 assert abs(correlations["drawn separately"]) < 0.1
 
 # %%
-title = f"Drawn separately, the channels lose their correlation of {correlations['real']:.2f}; drawn jointly, they keep it"
+title = f"Only noise drawn jointly keeps the channels' correlation of {correlations['real']:.2f}"
 alt = "Scatter of the residuals of two channels: real, drawn jointly, drawn separately"
 with drawing(alt, columns=3, height=2.4, title=title, sharex=True, sharey=True) as panels:
     shown = ({"real": new_residuals} | noise).items()

@@ -69,7 +69,7 @@ class Claim:
     Args:
         id: C1 to C9.
         short: What it says, in a few words.
-        sentence: What the paper says.
+        sentence: What the paper says, in few words.
         section: Where.
         figure: The figure that shows it.
         limits: The limits.
@@ -348,7 +348,7 @@ CLAIMS = (
         (
             Limit("nrmse", "error on held-out windows, in standard deviations of the true signal", high="coarse_nrmse"),
             Limit("nrmse", "error on held-out windows, in standard deviations of the true signal", high="allowed_nrmse", decides=WHOLE),
-            Limit("nrmse", "error beside that of ridge regression", high="ridge_nrmse", decides=OURS),
+            Limit("nrmse", "the same error, compared with that of ridge regression", high="ridge_nrmse", decides=OURS),
         ),
         functools.partial(measured, "enhancement"),
     ),
@@ -360,9 +360,9 @@ CLAIMS = (
         "fig04_enhanced_simulation",
         (
             Limit("times_real_time", "seconds of telemetry generated in a second", low=10_000),
-            Limit("gain_over_fine", "times as fast as a fine simulator of a battery", low=1),
-            Limit("ratio_to_simulator", "time beside a coarse simulator of a battery alone", high=2, decides=WHOLE),
-            Limit("ratio_to_formula", "time beside the square waves alone, one line of NumPy", high=2, decides=OURS),
+            Limit("gain_over_fine", "times as fast as a fine simulator of a battery, timed in its study", low=1),
+            Limit("ratio_to_simulator", "time divided by that of a battery's coarse simulator, timed in its study", high=2, decides=WHOLE),
+            Limit("ratio_to_formula", "time divided by that of the square waves, one line of NumPy", high=2, decides=OURS),
         ),
         functools.partial(measured, "speed"),
         margin=20.0,
@@ -415,8 +415,8 @@ CLAIMS = (
             Limit("scale_difference", "log ratio of the standard deviations", high=0.1),
             Limit("lag_one_error", "error of the lag-1 correlation, in units of its distance from white noise", high=0.5),
             Limit("marginal_distance", "distance of the distributions of values, in standard deviations", high=0.1),
-            Limit("rank_ratio", "effective rank beside that of real noise", low=0.8, decides=WHOLE),
-            Limit("auc", "AUC of a classifier, beside that for real noise 10 % louder", high="allowed_auc", decides=WHOLE),
+            Limit("rank_ratio", "effective rank divided by that of real noise", low=0.8, decides=WHOLE),
+            Limit("auc", "AUC of a classifier, compared with real noise 10 % louder", high="allowed_auc", decides=WHOLE),
         ),
         functools.partial(measured, "noise resemblance"),
     ),
@@ -429,8 +429,8 @@ CLAIMS = (
         (
             Limit("scale_difference", "log ratio of the standard deviations", high=0.1),
             Limit("marginal_distance", "distance of the distributions of values, in standard deviations", high=0.1),
-            Limit("roughness_ratio", "standard deviation of first differences beside the real one", low=0.8, high=1.25),
-            Limit("auc", "AUC of a classifier, beside that for telemetry 10 % larger", high="allowed_auc", decides=WHOLE),
+            Limit("roughness_ratio", "standard deviation of first differences divided by the real one", low=0.8, high=1.25),
+            Limit("auc", "AUC of a classifier, compared with telemetry 10 % larger", high="allowed_auc", decides=WHOLE),
         ),
         functools.partial(measured, "sum resemblance"),
     ),

@@ -1,6 +1,6 @@
 """Section 2.2: the first network, which maps the output of the simple simulator to the waveform of the telemetry.
 
-"We developed a wide, shallow Multi-Layer Perceptron (MLP) network."
+"For this example, we developed a wide, shallow Multi-Layer Perceptron (MLP) network."
 """
 
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ from enhsim_tf.paper.settings import Settings
 
 
 def initialiser(settings: Settings, of_author: str, number: int) -> keras.initializers.Initializer:
-    """The initialiser of one layer: the author's, or he_uniform if all layers have that; no other layer has the same number."""
+    """The initialiser of one layer: the author's, or he_uniform for all layers. `number` makes its seed different from all others."""
     name = of_author if settings.initialisers == "by layer" else settings.initialisers
     return type(keras.initializers.get(name))(seed=1_000 * settings.seed + number)
 
 
 def build_enhancer(settings: Settings) -> keras.Sequential:
-    """Figure 3: Dense 500, two hidden layers of 3,200, and Dense 500: 13,697,400 parameters.
+    """The network of Figure 3, read as Dense 500, two hidden layers of 3,200, and Dense 500: 13,697,400 parameters.
 
     "The input and output layers are the size of the time series. The inner layers are wider, at 3,200 neurons."
 
@@ -67,7 +67,7 @@ def train_enhancer(
     """Step 3: trains the network "to map low-fidelity to high-fidelity data".
 
     "The model is trained by matching a large number of source time series with a corresponding set of high-fidelity target time
-    series": 40 epochs with a batch size of 15. The target is the telemetry with its noise, which least squares averages out.
+    series": 40 epochs with a batch size of 15. The target here is the telemetry with its noise, which least squares averages out.
 
     Args:
         network: The network of `build_enhancer`.

@@ -194,7 +194,7 @@ def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Above a window of telemetry with its moving average, below the noise that remains."""
     settings, window = pipeline.settings, sample(pipeline, "test", 1, "figure 8")
     series, start = pipeline.parts["test"].values, int(window["start"][0])
-    before = settings.moving_average // (2 if settings.average == "centred" else 1)
+    before = settings.moving_average // 2 if settings.average == "centred" else settings.moving_average - 1
     begin = min(max(start, before), len(series) - settings.window - before)
     noise, average = extract_noise(series[begin - before : begin + settings.window + before], settings.moving_average, settings.average)
     noise, average, shown = noise[: settings.window], average[: settings.window], series[begin : begin + settings.window]
@@ -243,7 +243,7 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     history, last = pipeline.history, pipeline.settings.iterations
     chosen = history["iteration"] <= last
     figure, down = new_sheet(
-        DOUBLE, 2.7, "Accuracy and loss for real and generated rows", "Of the discriminator, on new rows. Dotted: chance."
+        DOUBLE, 2.7, "Accuracy and loss for real and generated rows", "Of the discriminator, on rows drawn anew. Dotted: chance."
     )
     axes = panels(figure, down + 0.2, 1, 2, right=0.8, gap=(0.24, 1.25))[0]
     for panel, key, chance, words in (

@@ -62,8 +62,10 @@ def build_generator(settings: Settings) -> keras.Sequential:
 def build_discriminator(settings: Settings) -> keras.Sequential:
     """Builds the discriminator of Figure 10: a convolution, pooled by its maximum, and layers that narrow to one neuron.
 
-    "One convolutional layer" with "a window 20 neurons wide with a stride of 4 neurons per step". "The layers are progressively narrowed
-    to the final single neuron who's value determines if the input is considered real or fake."
+    "One convolutional layer that merges input from 4 rows of inputs using a window 20 neurons wide with a stride of 4 neurons per step. This
+    layer pools each convolution based on the maximum value of the sample." (What the 4 rows are is open.) "The layers are progressively
+    narrowed to the final single neuron who's value determines if the input is considered real or fake." Dropout, relu and the number of
+    filters are those of the author's code.
 
     Returns:
         A network from `(rows, window, 1)` to `(rows, 1)`, the probability that a row is real.
@@ -97,7 +99,7 @@ class NoiseGAN(keras.Model):
     Args:
         generator: The network of `build_generator`.
         discriminator: The network of `build_discriminator`.
-        settings: All settings.
+        settings: All settings. With `fast`, `self.discriminator` is another network with the same weights.
     """
 
     def __init__(self, generator: keras.Model, discriminator: keras.Model, settings: Settings):
@@ -114,8 +116,8 @@ class NoiseGAN(keras.Model):
         }
 
     def compile(self) -> None:
-        """Sets the loss and an optimizer for each network: "a binary cross-entropy loss function and the Adam adaptive optimizer"."""
-        super().compile(jit_compile=False)
+        """Sets the loss, binary cross-entropy, and an Adam optimizer for each network."""
+        super().compile(optimizer=None, jit_compile=False)
         adam = fused_adam if self.settings.fast else keras.optimizers.Adam
         self.discriminator_adam, self.generator_adam = (adam(self.settings.gan_learning_rate) for _ in range(2))
         self.loss_function = keras.losses.BinaryCrossentropy()
@@ -168,16 +170,16 @@ class NoiseGAN(keras.Model):
         self.trackers["generator_loss"].update_state(loss)
 
     def test_step(self, real: tf.Tensor) -> dict[str, tf.Tensor]:
-        """Accuracy, "how many of the real and fake samples were correctly classified", and loss, on new rows of each kind."""
+        """Accuracy, "how many of the real and fake samples were correctly classified", and loss, on rows of each kind, drawn anew."""
         number = self.settings.rows
         real = tf.reshape(real, (number, self.settings.window, 1))
         generated = self.generator(self.draw_latent(number), training=False)
         measured = {}
         for kind, rows, tag in (("real", real, REAL), ("generated", generated, GENERATED)):
             predicted = self.discriminator(rows, training=False)
-            is_right = tf.equal(predicted > 0.5, tag == REAL)
-            self.trackers[f"accuracy_{kind}"].update_state(tf.reduce_mean(tf.cast(is_right, tf.float32)))
-            self.trackers[f"loss_{kind}"].update_state(self.loss_function(labels(number, tag), predicted))
+            tags = labels(number, tag)
+            self.trackers[f"accuracy_{kind}"].update_state(keras.metrics.binary_accuracy(tags, predicted))
+            self.trackers[f"loss_{kind}"].update_state(self.loss_function(tags, predicted))
             measured |= {name: self.trackers[name].result() for name in (f"accuracy_{kind}", f"loss_{kind}")}
         return measured
 
@@ -210,6 +212,8 @@ def train_gan(
 ) -> dict[str, list[float]]:
     """Step 8: trains the GAN "to create realistic environment influence", "sampled at 100-step intervals".
 
+    An epoch of Keras is such an interval of `record_every` iterations, and its validation the sample.
+
     Args:
         gan: A compiled GAN.
         noise: Real rows, float32 of shape `(rows, window)`.
@@ -237,4 +241,4 @@ def train_gan(
 def generate_noise(generator: keras.Model, number: int, settings: Settings, rng: np.random.Generator) -> np.ndarray:
     """Step 9: generates "environmental influences", float32 of shape `(number, window)`; `rng` draws the latent vectors."""
     latent = settings.latent_scale * rng.standard_normal((number, settings.latent), np.float32)
-    return predict(generator, latent.astype(np.float32))[:, :, 0]
+    return predict(generator, latent)[:, :, 0]

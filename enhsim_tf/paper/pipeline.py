@@ -122,7 +122,7 @@ class Pipeline:
 
     def _train_enhancer(self, folder: Path) -> None:
         train = self.windows("train", self.settings.num_windows, "training windows")
-        held_out = self.windows("test", min(200, self.settings.num_windows), "validation windows")
+        held_out = self.windows("test", min(200, self.settings.num_windows), "validation windows")  # by which nothing is chosen
         told = self.stages.progress.loop("epoch", self.settings.epochs)
         watch = keras.callbacks.LambdaCallback(on_epoch_end=lambda epoch, logs: told(epoch + 1))
         network, validation = build_enhancer(self.settings), (held_out["coarse"], held_out["target"])

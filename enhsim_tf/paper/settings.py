@@ -15,6 +15,15 @@ PAPER, AUTHOR, OURS = "paper", "author's code", "our choice"
 GAN_CODE = "pgfeldman/GAN_brownbag 50f5635, brownbag/OneDGAN2.py"
 MLP_CODE = "pgfeldman/optevolver 3708ccc, examples/TF2_opt_example.py"
 
+# longer reasons and quotations
+LEARNING_RATE = "with 0.01, errors of 1.01 and .26 after 40 epochs (seeds 0, 1); with 0.001, .06 to .18"
+INITIALISERS = "he_uniform in Dense 64 and Dense 25, else Keras' default, glorot_uniform"
+AVERAGE = "pandas' default is trailing: it lags by 12 s and leaves 0.15 of the rotation's 0.25 in the noise"
+SPAN = "4 by default, 2 pi in the demo; this variable also holds the range of the function to be learnt"
+FILTERS = f"{GAN_CODE}; the 4 rows may be a slip for the stride, or 4 filters: filters=4"
+UPDATE = '"trains on the entire batch (200 rows) of real and generated data"'
+UPDATES = ("mixed 100 + 100", "mixed 200 + 200", "two of 200")
+
 
 def setting(
     value: Any,
@@ -57,104 +66,42 @@ class Settings:
     rotation_amplitude: float = setting(0.25, "telemetry", OURS, "half the orbit's amplitude, so that both waves of the sum are visible")
     noise_sd: float = setting(0.1, "telemetry", OURS, "Gaussian; small beside the waves and still visible", author="0.1 in a comment")
     interval: float = setting(1.0, "telemetry", OURS, "500 samples then last slightly more than one orbit", unit="s")
-    num_samples: int = setting(
-        2_073_600, "telemetry", OURS, "24 days: the test part has 1,000 disjoint windows", unit="samples", smoke=120_000
-    )
-    window: int = setting(
-        500, "windows", PAPER, "section 2.3", '"500 neurons, the number of samples in the time series"', "100", unit="samples"
-    )
+    num_samples: int = setting(2_073_600, "telemetry", OURS, "24 days: 1,000 disjoint test windows", unit="samples", smoke=120_000)
+    window: int = setting(500, "windows", PAPER, "section 2.3", '"the number of samples in the time series"', "100", unit="samples")
 
     # section 2.2: the enhancer
-    num_windows: int = setting(
-        1_500, "windows", AUTHOR, "within the range of his examples", '"a large number"', "10 to 3,000", unit="windows", smoke=60
-    )
+    num_windows: int = setting(1_500, "windows", OURS, "15,000 is a reading", '"a large number"', "10 to 3,000", unit="windows", smoke=60)
     hidden_units: int = setting(3_200, "enhancer", PAPER, "section 2.2", "3,200", "200", unit="units")
     num_hidden: int = setting(2, "enhancer", PAPER, "section 2.2: Hidden_1 and Hidden_2 between input and output", "2", "1", unit="layers")
     epochs: int = setting(40, "enhancer", PAPER, "section 2.2", "40", "10 to 100", unit="epochs", smoke=2)
     batch_size: int = setting(15, "enhancer", PAPER, "section 2.2", "15", "2 to 20", unit="windows")
-    learning_rate: float = setting(
-        0.001,
-        "enhancer",
-        OURS,
-        "with 0.01, loss 7.8 and 12 in the first epoch and error .137 and .176 after 8 (seeds 1, 2); with 0.001, .02, .132 and .102",
-        "",
-        "0.01, for 200 units",
-    )
+    learning_rate: float = setting(0.001, "enhancer", OURS, LEARNING_RATE, author="0.01, for 200 units")
     loss: str = setting("mean_squared_error", "enhancer", AUTHOR, MLP_CODE, "", "mean squared error")
     initialisers: str = setting(
-        "by layer",
-        "enhancer, noise GAN",
-        AUTHOR,
-        f"{GAN_CODE}; none is given in {MLP_CODE}",
-        "",
-        "he_uniform in Dense 64 and Dense 25, else Keras' default glorot_uniform",
-        choices=("by layer", "he_uniform"),
+        "by layer", "enhancer, noise GAN", AUTHOR, f"{GAN_CODE} and {MLP_CODE}", author=INITIALISERS, choices=("by layer", "he_uniform")
     )
 
     # section 2.3: the noise and its GAN
-    moving_average: int = setting(
-        25, "noise", OURS, "short beside 2 minutes, and its edges are cut, never padded", "pandas' rolling mean, no width", unit="samples"
-    )
-    average: str = setting(
-        "centred",
-        "noise",
-        OURS,
-        "pandas' default is trailing: it lags by 12 s and leaves 0.15 of the rotation's 0.25 in the noise",
-        "pandas' rolling mean",
-        choices=("centred", "trailing"),
-    )
+    moving_average: int = setting(25, "noise", OURS, "short beside 2 minutes; edges are cut", "pandas' rolling mean", unit="samples")
+    average: str = setting("centred", "noise", OURS, AVERAGE, "pandas' rolling mean", choices=("centred", "trailing"))
     latent: int = setting(16, "noise GAN", PAPER, "section 2.3", "16", "16", unit="elements")
-    latent_scale: float = setting(
-        1.0,
-        "noise GAN",
-        OURS,
-        "a standard normal draw: the normalisation removes the scale again. With 1, 4, 2 pi after 300 iterations (seed 1): "
-        "log scale off by .22, .08, .20, lag-1 by .03, .05, .02, effective rank 48, 38, 43, excess kurtosis .1, .8, .5",
-        "",
-        "span: 4 by default, 2 pi in the demo; it also holds the range of the function to be learnt",
-    )
+    latent_scale: float = setting(1.0, "noise GAN", OURS, "a standard normal draw; 4 and 2 pi are readings", author=SPAN)
     generator_units: int = setting(64, "noise GAN", PAPER, "section 2.3", "64", "64", unit="units")
     generator_activation: str = setting("tanh", "noise GAN", AUTHOR, GAN_CODE, "", "tanh")
-    filters: int = setting(
-        500,
-        "noise GAN",
-        AUTHOR,
-        f"{GAN_CODE}; the 4 rows may be a slip for the stride, or 4 filters: filters=4",
-        '"merges input from 4 rows"',
-        "the window's length",
-        unit="filters",
-    )
+    filters: int = setting(500, "noise GAN", AUTHOR, FILTERS, '"merges input from 4 rows"', "the window's length", unit="filters")
     filter_width: int = setting(20, "noise GAN", PAPER, "section 2.3", '"a window 20 neurons wide"', "20", unit="samples")
     stride: int = setting(4, "noise GAN", PAPER, "section 2.3", '"a stride of 4 neurons"', "4", unit="samples")
-    narrow_units: int = setting(
-        25,
-        "noise GAN",
-        AUTHOR,
-        f"{GAN_CODE}; half the window in OneDGAN2a.py",
-        '"progressively narrowed"',
-        "25, or half the window",
-        unit="units",
-    )
-    dropout: float = setting(0.3, "noise GAN", AUTHOR, GAN_CODE, "", "0.3 after the convolution and after the narrow layer")
+    narrow_units: int = setting(25, "noise GAN", AUTHOR, GAN_CODE, '"progressively narrowed"', "25, or half the window", unit="units")
+    dropout: float = setting(0.3, "noise GAN", AUTHOR, GAN_CODE, author="0.3 after the convolution and after the narrow layer")
     rows: int = setting(200, "noise GAN", PAPER, "section 2.3", '"the entire batch (200 rows)"', "one number for all", unit="rows")
-    update: str = setting(
-        "mixed 100 + 100",
-        "noise GAN",
-        PAPER,
-        "section 2.3: one update on a batch of 200 rows, half of them real",
-        '"trains on the entire batch (200 rows) of real and generated data"',
-        "two updates, real then generated",
-        choices=("mixed 100 + 100", "mixed 200 + 200", "two of 200"),
-    )
+    update: str = setting("mixed 100 + 100", "noise GAN", PAPER, "section 2.3", UPDATE, "two updates, real then generated", choices=UPDATES)
     gan_learning_rate: float = setting(0.001, "noise GAN", AUTHOR, GAN_CODE, "Adam", "Adam, 0.001")
     iterations: int = setting(1_000, "noise GAN", PAPER, "section 2.3", "around 1,000", "1,000", unit="iterations", smoke=20)
     record_every: int = setting(100, "noise GAN", PAPER, "section 2.3", "100-step intervals", "100", unit="iterations", smoke=5)
     rounds: int = setting(2, "noise GAN", OURS, "C4 follows training beyond the paper's number; all else uses the networks at it")
 
     # how claims are measured
-    detector_windows: int = setting(
-        1_000, "claims", OURS, "training windows of a detector; as many others set its threshold", unit="windows", smoke=60
-    )
+    detector_windows: int = setting(1_000, "claims", OURS, "to train a detector; as many set its threshold", unit="windows", smoke=60)
     false_alarm_rate: float = setting(0.01, "claims", OURS, "of each threshold, on windows of the detector's own kind of training data")
     num_components: int = setting(20, "claims", OURS, "of the PCA residual; the waves take up to four", unit="components")
     num_trees: int = setting(200, "claims", OURS, "of the isolation forest", unit="trees")
@@ -162,12 +109,7 @@ class Settings:
     severity: float = setting(0.5, "claims", OURS, "the middle of the range, in each degraded mode")
     speed_windows: int = setting(2_048, "claims", OURS, "generated at a time when C2 is timed", unit="windows", smoke=256)
 
-    fast: bool = setting(
-        True,
-        "enhancer, noise GAN",
-        OURS,
-        "fused Adam, Dense by blocks, convolution with its maximum: the same numbers up to rounding, faster",
-    )
+    fast: bool = setting(True, "enhancer, noise GAN", OURS, "faster steps, equal up to rounding but for the masks of dropout")
 
     def of(self, *stages: str) -> dict[str, Any]:
         """The values on which the results of these stages depend, by name."""

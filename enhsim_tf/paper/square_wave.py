@@ -1,6 +1,6 @@
-"""Section 2.1: the simple, fast simulation, and the degraded configurations that it can run in (sections 1 and 3).
+"""Sections 1 and 2.1: the simple, fast simulation, and degraded configurations, whose six modes are this project's.
 
-"This simulation can be quite coarse - for example a square wave can be used for nearly any periodic waveform."
+"This simulation can be quite coarse - for example a square wave can be used for nearly any periodic waveform" (introduction).
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ def square_wave(time: np.ndarray, period: float, amplitude: float) -> np.ndarray
 
 
 def simulator(settings: Settings) -> Signal:
-    """Step 1: the simulator of the example, a square wave in place of each sine, as a function of the time in seconds."""
+    """Step 1: the simulator of the example, here a square wave in place of each sine, as a function of the time in seconds."""
 
     def simulate(time: np.ndarray) -> np.ndarray:
         orbit = square_wave(time, settings.orbit_period, settings.orbit_amplitude)
@@ -57,7 +57,12 @@ def degrade(
 
     Returns:
         float64 array of shape `(windows, samples)`.
+
+    Raises:
+        ValueError: If there is no such mode.
     """
+    if mode not in ("nominal", *MODES):
+        raise ValueError(f"Expected a mode, nominal or one of {', '.join(MODES)}. Received: {mode!r}.")
     time, late, (low, high) = time.copy(), time[:, onset:], levels
     begin = late[:, :1]
 

@@ -95,7 +95,7 @@ def make_telemetry(settings: Settings, rng: np.random.Generator) -> Telemetry:
 
 
 def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetry]:
-    """Cuts telemetry into `PARTS`, with a gap of one window between them, so that no window lies in two parts.
+    """Cuts telemetry into `PARTS`, with a gap of one window between them.
 
     The moving average of `average` samples shortens the noise of a part.
 
