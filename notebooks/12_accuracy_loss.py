@@ -202,7 +202,7 @@ check_answer(
 # ```
 #
 # One half: it calls three quarters of everything real, so its word says nothing. That is why the claim is evaluated on both kinds
-# together.
+# together, and asks that neither is recognised too rarely.
 #
 # </details>
 

@@ -182,7 +182,7 @@ with drawing(alt, 2, 2.4, title, sharey=True) as panels:
 # %% [markdown]
 # *What to see:* in both panels the loss on generated noise moves, which looks like training. On the left it rises, and the loss on real
 # noise stands still: only the generator learns. On the right the discriminator learns to recognise generated noise within some twenty
-# steps.
+# steps, while its loss on real noise rises.
 
 # %%
 (classic_first, classic_last), (named_first, named_last) = (

@@ -395,7 +395,7 @@ for regime, found in battery["regimes"].items():
     )
 
 # %% [markdown]
-# **Answer.** Rarely: only on the hard battery, where a network takes a few per cent off the error of ridge regression, and where random
+# **Answer.** Rarely: only on the hard battery, where a network takes 8 % off the error of ridge regression, and where random
 # features were not tried. A network can pay only where no matrix suffices. Even there, ask first what the physics suggests, such as a
 # square, and what random features find. `fit` uses them for what ridge regression leaves, and trains the paper's network only on request.
 #

@@ -132,14 +132,14 @@ assert rank["GAN"] < rank["real"] / 2
 
 # %%
 results = json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))
-full = {name: value for claim in results["claims"] for name, value in claim["measured"].items()}
+full = {claim["id"]: claim["measured"] for claim in results["claims"]}
 rows = {
-    "error of the network": (error["network"], full["nrmse"]),
-    "error of ridge regression": (error["ridge"], full["ridge_nrmse"]),
-    "effective rank, GAN over real": (rank["GAN"] / rank["real"], full["rank_ratio"]),
+    "error of the network": (error["network"], full["C1"]["nrmse"]),
+    "error of ridge regression": (error["ridge"], full["C1"]["ridge_nrmse"]),
+    "effective rank, GAN over real": (rank["GAN"] / rank["real"], full["C6"]["rank_ratio"]),
 }
 for name in kinds:
-    rows[f"false alarms, {name}"] = alarms[name], full[f"false alarms, {name}, PCA residual"]
+    rows[f"false alarms, {name}"] = alarms[name], full["C8"][f"false alarms, {name}, PCA residual"]
 print(f"{'':40}{'here':>8}{'full size':>12}")
 for name, (here, there) in rows.items():
     print(f"{name:40}{here:8.3f}{there:12.3f}")
