@@ -233,8 +233,8 @@ for (phase, name), (number, total) in moved.items():
 
 # %% [markdown]
 # **Answer.** The discriminator learns from tags, and its gradient tells the generator how to change its windows so that they are taken for
-# real. After 1,000 iterations, the noise has nearly the real standard deviation. (The GAN of notebook 12 is the pipeline's, with other draws, so
-# its curve is another.)
+# real. After 1,000 iterations, the noise has nearly the real standard deviation. (The GAN of notebook 12 is the
+# pipeline's, with other draws, so its curve is another.)
 #
 # ## Exercises
 #

@@ -244,7 +244,8 @@ assert budget == "smoke" or table["ridge, nominal and faults"][3] < table["netwo
 # ![Error against severity for each degraded mode and four enhancers](../studies/robustness/results/degraded_modes.png)
 #
 # *What to see:* in the shaded range, of severities that training has shown, the enhancers that have seen faults lie below the paper's
-# network, except with friction, where all are alike. Beyond it their errors grow, too. For them, dropout is the hardest mode: a signal that was lost cannot be enhanced.
+# network, except with friction, where all are alike. Beyond it their errors grow, too. For them, dropout is the hardest mode: a signal
+# that was lost cannot be enhanced.
 
 # %%
 found, _ = open_study("robustness")
