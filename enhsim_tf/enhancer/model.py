@@ -12,31 +12,17 @@ _AVERAGED = 512  # overlapping windows that are enhanced at a time
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Enhancer:
-    """A map from coarse windows to telemetry windows: a linear map, a stack of Dense layers with relu, or the sum of both.
+    """A map from coarse windows to telemetry windows: a linear map, a stack of Dense layers with relu, or the sum of both."""
 
-    Args:
-        name: Name of the candidate, one of `candidates.CANDIDATES`.
-        window: Length of a window in samples.
-        columns: Number of coarse columns.
-        channels: Number of channels.
-        centre: Centre of each coarse column, float32 of shape `(columns,)`, which is subtracted first.
-        bias: Output for coarse windows at their centre, float32 of shape `(window * channels,)`.
-        factors: Matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs; none for no linear map.
-        layers: Kernel and bias of each Dense layer of a network beside the linear map.
-        main: For the candidates that keep the shape of the coarse simulator: for each channel its column, and its gain; otherwise None.
-        penalties: Penalty of each channel in the ridge regression; they are not saved.
-    """
-
-    name: str
-    window: int
+    name: str  # one of `candidates.CANDIDATES`
+    window: int  # samples of a window
     columns: int
     channels: int
-    centre: np.ndarray
-    bias: np.ndarray
-    factors: tuple[np.ndarray, ...] = ()
-    layers: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-    main: tuple[np.ndarray, np.ndarray] | None = None
-    penalties: tuple[float, ...] = ()
+    centre: np.ndarray  # of each coarse column, which is subtracted first, float32 of shape `(columns,)`
+    bias: np.ndarray  # output for coarse windows at their centre, float32 of shape `(window * channels,)`
+    factors: tuple[np.ndarray, ...] = ()  # matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs
+    layers: tuple[tuple[np.ndarray, np.ndarray], ...] = ()  # kernel and bias of each Dense layer of a network beside the linear map
+    main: tuple[np.ndarray, np.ndarray] | None = None  # for candidates that keep the coarse shape: the column of each channel, and its gain
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
         """Maps coarse windows to enhanced windows.
@@ -90,23 +76,14 @@ class Enhancer:
 
     @classmethod
     def from_arrays(cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> "Enhancer":
-        """Builds an enhancer again.
-
-        Args:
-            settings: As `Enhancer.settings`.
-            arrays: As `Enhancer.arrays`.
-
-        Raises:
-            ValueError, KeyError, IndexError, TypeError: If they are not those of an enhancer.
-        """
+        """Builds an enhancer again from `settings` and `arrays`; raises ValueError, KeyError, IndexError or TypeError if they are of none."""
         window, columns, channels = (int(settings[name]) for name in ("window", "columns", "channels"))
         if not all(np.isfinite(each).all() for each in arrays.values()):
             raise ValueError("an enhancer whose numbers are not finite")
         known = {name: each.astype(np.float32) for name, each in arrays.items()}
         factors = tuple(known[name] for name in ("factor_0", "factor_1") if name in known)
-        layers = tuple(
-            (known[f"kernel_{each}"], known[f"bias_{each}"]) for each in range(sum(name.startswith("kernel_") for name in known))
-        )
+        number = sum(name.startswith("kernel_") for name in known)
+        layers = tuple((known[f"kernel_{each}"], known[f"bias_{each}"]) for each in range(number))
         main = (arrays["column"].astype(np.int64), known["gain"]) if "column" in arrays else None
         if known["centre"].shape != (columns,) or known["bias"].shape != (window * channels,) or (main is not None and main[0].min() < 0):
             raise ValueError("an enhancer whose arrays do not fit together")

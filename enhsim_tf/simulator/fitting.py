@@ -314,9 +314,8 @@ def _held_out_residuals(
         enhancer: Enhancer = choice.without_fold
         if fold:
             kept, _ = split_fold(times, window, choice.edges, fold)
-            enhancer = fit_enhancer(
-                enhancer.name, inputs[kept], targets[kept], times[kept], options.seed, options.epochs, enhancer.penalties
-            )
+            windows = inputs[kept], targets[kept], times[kept]
+            enhancer = fit_enhancer(enhancer.name, *windows, options.seed, options.epochs, choice.penalties)
         other = EnhancedSimulator(simulator.alignment, enhancer, None, simulator.channels, simulator.interval_s)
         for block in range(fold, len(choice.edges) - 1, NUM_FOLDS):
             for part, coarse in zip(learnt.parts, run.parts, strict=True):

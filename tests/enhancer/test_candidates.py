@@ -177,21 +177,15 @@ def test_an_error_that_is_one_per_cent_larger_is_as_good(squared, is_within):
     assert first.is_within == is_within
 
 
-def test_held_out_errors_do_not_depend_on_held_out_windows_during_training(monkeypatch):
+def test_candidates_with_one_ridge_regression_are_judged_without_held_out_windows_and_then_fitted_to_all(monkeypatch):
     seen = []
-    monkeypatch.setattr(
-        candidates,
-        "fit_enhancer",
-        lambda name, inputs, targets, starts, *rest: seen.append(starts) or fit_enhancer(name, inputs, targets, starts),
-    )
+    monkeypatch.setattr(candidates, "fit_ridge", lambda *given, **options: seen.append(given[2]) or fit_ridge(*given, **options))
     coarse = series()
     inputs, targets, starts = windows_of(coarse, coarse[:, 0])
-    choose_enhancer(inputs, targets, starts, RIDGE)
-    *judging, refitting = seen
-    edges = block_edges(0, int(starts.max()) + WINDOW, WINDOW)
-    for each in judging:
-        np.testing.assert_array_equal(each, starts[split_fold(starts, WINDOW, edges, 0)[0]])
-    np.testing.assert_array_equal(refitting, starts)
+    choose_enhancer(inputs, targets, starts, RIDGE_AND_FEATURES)
+    learnt = starts[split_fold(starts, WINDOW, block_edges(0, int(starts.max()) + WINDOW, WINDOW), 0)[0]]
+    for found, expected in zip(seen, (learnt, learnt, starts, starts), strict=True):  # of the columns and of the features
+        np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize(
