@@ -43,7 +43,6 @@ class Recording:
         start: Zero of the time axis as ISO 8601 text in UTC, or None if the recording has no times.
         name: Name in messages.
         notes: What was repaired or left out when the recording was read, one line each.
-        counts: Whether the times count from a zero of their own, which `start` then writes as 1970.
     """
 
     parts: tuple[Run, ...]
@@ -52,7 +51,6 @@ class Recording:
     start: str | None = None
     name: str = "the coarse run"
     notes: tuple[str, ...] = ()
-    counts: bool = False
 
     def __post_init__(self):
         check_columns(self.columns)

@@ -97,19 +97,14 @@ def read_recording(
         rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(begin, end), cleaning) if len(cells.columns) else []
         carried = {each: cells[each].iloc[rows].reset_index(drop=True) for each in cells}
         parts.append(Run(values[begin:end], grid_s * begin + offset_s, carried))
-    clock = cleaned[names[0]].report.find("clock")
-    counts = bool(clock is not None and clock.details.get("counts"))
-    shift_ns = 0 if start is None else _start_ns(start, counts, name)
-    zero = iso_time(base + shift_ns) if has_time else None
-    return Recording(tuple(parts), tuple(names), grid_s, zero, name, tuple(map(printable, notes)), counts and start is None)
-
-
-def _start_ns(start: str, counts: bool, name: str) -> int:
-    if not counts:
-        raise InputError(
-            f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
-        )
-    return _begin_ns(Telemetry(np.zeros(1, np.float32), start=start))
+    if start is not None:
+        clock = first.find("clock")
+        if clock is None or not clock.details.get("counts"):
+            raise InputError(
+                f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
+            )
+        base += _begin_ns(Telemetry(np.zeros(1, np.float32), start=start))
+    return Recording(tuple(parts), tuple(names), grid_s, iso_time(base) if has_time else None, name, tuple(map(printable, notes)))
 
 
 def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning) -> tuple[dict[str, pd.Series], str]:

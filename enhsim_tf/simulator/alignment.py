@@ -320,11 +320,10 @@ def pair_recordings(telemetry: Recording, run: Recording, delay_s: float, least_
     """Cuts telemetry and a coarse run to the same parts, which both cover, on the clock of the telemetry; see `pair_with_recording`."""
     values, coarse, interval_s = [], [], telemetry.interval_s
     for pair in pair_with_recording(telemetry_of(telemetry), run, delay_s, least_samples):
-        low = pair.telemetry.offset_s
-        part = next(each for each in telemetry.parts if -1e-6 <= low - each.offset_s <= interval_s * (len(each) - 0.5))
-        first = round((low - part.offset_s) / interval_s)
-        values.append(Run(part.values[first : first + len(pair)], low))
-        coarse.append(Run(pair.coarse, low))
+        part = telemetry.parts[pair.part]
+        begin_s = part.offset_s + interval_s * pair.first
+        values.append(Run(part.values[pair.first : pair.first + len(pair.coarse)], begin_s))
+        coarse.append(Run(pair.coarse, begin_s))
     joined = dataclasses.replace(telemetry, parts=tuple(values))
     return joined, dataclasses.replace(run, parts=tuple(coarse), interval_s=interval_s, start=telemetry.start)
 

@@ -98,7 +98,7 @@ def score_figure(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: st
     number = len(events_table(frame))
     title = f"{drawable(name, 30)}: {number:,} {'event' if number == 1 else 'events'}, {frame['flag'].mean():.1%} of samples flagged"
     subtitle = f"Detector: {frame.attrs['detector']}. Shaded: events. Dashed: threshold."
-    rows, times = len(channels) + 1, told_times(frame.index)
+    rows, times = len(channels) + 1, told_times(frame)
     has_time = hasattr(times, "tz")
     times = times.tz_convert(None) if has_time and times.tz is not None else times
     with matplotlib.style.context(STYLE):

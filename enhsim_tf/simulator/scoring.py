@@ -182,7 +182,7 @@ def score(
         with a lasting departure `score_after` (scores against the new operating point), and with a run `out_of_range` (above 1, the coarse run
         is outside the training range). Samples in parts shorter than a window, or without a run, have NaN in place of scores. `frame.attrs` holds
         `detector`, `expected_false_alarm_rate`, `events` (the rows of `events_table`), `false_alarms_per_day` (with its 95 % interval, on
-        generated telemetry) and `departure` (a sentence, or an empty text).
+        generated telemetry), `departure` (a sentence, or an empty text) and `counts` (whether the clock counts from zero).
 
     Raises:
         InputError: If channels, interval or run do not fit to the simulator, or if every part is shorter than a window.
@@ -217,6 +217,7 @@ def score(
         columns |= dict(zip(names, enhanced.T, strict=True))
     columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
     frame = pd.DataFrame(columns, index=pd.concat([to_series(part) for part in telemetry_of(telemetry)]).index)
+    frame.attrs["counts"] = telemetry.clock().counts
     departure = find_departure(simulator, scorer.score_series, scores, judged)
     if departure is not None:
         frame["score_after"] = departure.scores
@@ -268,7 +269,7 @@ def _note(frame: "pd.DataFrame", scorer: Scorer, edges: Sequence[int], departure
     frame.attrs["events"] = event_rows(frame["score"].to_numpy(), edges, nominal, scorer.window, interval_s, since)
     frame.attrs["departure"] = ""
     if departure is not None:
-        when = told_times(frame.index[[since]])[0]
+        when = told_times(frame, frame.index[[since]])[0]
         when = f"{when:.10g} s" if isinstance(when, float) else when
         frame.attrs["departure"] = (
             f"since {when} the telemetry has left what was learnt and stays there "
@@ -305,13 +306,14 @@ def event_rows(
     ]
 
 
-def told_times(index: "pd.Index") -> "pd.Index":
-    """Returns the times as they are written: those in 1970 come from a clock that counts from zero, and are seconds again."""
+def told_times(frame: "pd.DataFrame", index: "pd.Index | None" = None) -> "pd.Index":
+    """Returns times of scores, those of all samples if none are given, as they are written: of a clock that counts from zero in seconds."""
     import pandas as pd
 
-    if not isinstance(index, pd.DatetimeIndex) or not len(index) or index[0].year != 1970:
+    index = frame.index if index is None else index
+    if not frame.attrs["counts"]:
         return index
-    return pd.Index((index - pd.Timestamp(0, tz=index.tz)) / pd.Timedelta(seconds=1), name=index.name)
+    return pd.Index((index - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1), name=index.name)
 
 
 def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
@@ -335,7 +337,7 @@ def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
     else:
         after = index[end - 1] + 1
     places = {"begin": index[begin], "end": after, "peak": index[table["peak"].to_numpy(int)]}
-    return table.assign(**{name: told_times(place) for name, place in places.items()})
+    return table.assign(**{name: told_times(frame, place) for name, place in places.items()})
 
 
 def events_path(path: str | os.PathLike) -> Path:
@@ -347,7 +349,7 @@ def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
     """Writes what `score` returns to a `.parquet` or `.csv` file, and the events to `events_path`. Both files appear when they are complete."""
     with replace_file(path) as temporary, replace_file(events_path(path)) as events:
         events_table(frame).to_csv(events, index=False)
-        plain = frame.set_axis(told_times(frame.index))
+        plain = frame.set_axis(told_times(frame))
         plain.attrs = {}  # Parquet would store them as JSON
         if Path(path).suffix == ".csv":
             plain.to_csv(temporary)
