@@ -56,11 +56,7 @@ class FmuSimulator:
         self._check_names(commands.columns if commands else (), "input", "input")
 
     def run(self, time_s: np.ndarray, scenario: Mapping[str, float] | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates one run, see `interface.CoarseSimulator.run`; a scenario gives other values of parameters by name.
-
-        Raises:
-            InputError: If a parameter does not exist, the commands do not cover the times, or the simulation fails.
-        """
+        """Simulates one run, see `interface.CoarseSimulator.run`; a scenario gives other values of parameters by name."""
         import fmpy
 
         if scenario is not None and not isinstance(scenario, Mapping):
@@ -69,7 +65,10 @@ class FmuSimulator:
             )
         self._check_names(scenario or {}, "parameter", "parameter")
         time_s = np.asarray(time_s, np.float64)
-        step_s, inputs = float(np.mean(np.diff(time_s))), self._inputs(time_s)
+        step_s, inputs = float(np.mean(np.diff(time_s))), None
+        if self.commands is not None:
+            columns = self.commands.run(time_s).astype(np.float64).T
+            inputs = np.rec.fromarrays([time_s, *columns], names=["time", *self.commands.columns])
         try:
             found = fmpy.simulate_fmu(
                 str(self.path),
@@ -90,13 +89,6 @@ class FmuSimulator:
                 f"Expected results of {self.name} at all {len(time_s)} times. Received: {len(found)}. Choose another interval."
             )
         return np.stack([found[name][places] for name in self.columns], axis=1).astype(np.float64)
-
-    def _inputs(self, time_s: np.ndarray) -> np.ndarray | None:
-        """The commands at the times of a run, in the form of FMPy."""
-        if self.commands is None:
-            return None
-        columns = self.commands.run(time_s).astype(np.float64).T
-        return np.rec.fromarrays([time_s, *columns], names=["time", *self.commands.columns])
 
     def _check_names(self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None) -> None:
         for name in names:

@@ -89,18 +89,10 @@ def _seconds_between(telemetry: Telemetry, recording: Recording) -> float:
 
 
 def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples: int) -> Delay:
-    """Estimates a constant delay by cross-correlation.
+    """Estimates a constant delay of at most so many samples by cross-correlation; 0 if no coarse column is correlated with the telemetry.
 
     The coarse column with the largest squared correlation at any delay is used. Among its local maxima that are about as high as the
     highest, the one nearest to no delay is taken, because a periodic signal has a maximum in every period.
-
-    Args:
-        parts: Contiguous parts of telemetry on one clock.
-        recording: The recorded run.
-        max_samples: Largest delay in samples, in both directions: usually the length of a window.
-
-    Returns:
-        The delay, a whole number of samples. It is 0 if no coarse column is correlated with the telemetry.
 
     Raises:
         InputError: If the two share no time, or if the telemetry agrees clearly better at a longer delay.

@@ -61,11 +61,7 @@ class Recording:
         return sum(map(len, self.parts))
 
     def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Returns what was recorded, as `at`, and refuses all else, see `interface.CoarseSimulator.run`.
-
-        Raises:
-            InputError: If a scenario is given, or if a time is not covered.
-        """
+        """Returns what was recorded, as `at`; raises InputError if a scenario is given or a time is not covered."""
         if scenario is not None:
             raise InputError(
                 f"Expected no scenario with a recorded run. Received: {str(scenario)[:80]!r}. Record a run of it and give that."
@@ -81,13 +77,9 @@ class Recording:
         return values
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """Returns what was recorded at given times, interpolated linearly between samples, and NaN where nothing was.
+        """Returns what was recorded at times in seconds after the start, float32 of shape `(samples, columns)`.
 
-        Args:
-            time_s: Times in seconds after the start of the recording, shape `(samples,)`.
-
-        Returns:
-            float32 array of shape `(samples, columns)`.
+        Between samples it is interpolated linearly; where nothing was recorded, it is NaN.
         """
         time_s = np.asarray(time_s, np.float64)
         values = np.full((len(time_s), len(self.columns)), np.nan, np.float32)
@@ -107,11 +99,7 @@ class Recording:
         return Telemetry(np.zeros(length, np.float32), self.interval_s, offset_s, self.start, self.name)
 
     def select(self, columns: Sequence[str]) -> "Recording":
-        """Returns the recording with the named columns, in the given order.
-
-        Raises:
-            InputError: If a column is missing.
-        """
+        """Returns the recording with the named columns, in the given order; raises InputError if one is missing."""
         missing = [name for name in columns if name not in self.columns]
         if missing:
             raise InputError(

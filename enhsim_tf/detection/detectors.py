@@ -45,12 +45,7 @@ class LimitCheck:
 
 
 class PCAResidual:
-    """Residual of a window outside the principal components of the training windows, also known as Sub-PCA.
-
-    Args:
-        num_components: Number of principal components.
-        seed: Seed for the randomised solver.
-    """
+    """Residual of a window outside so many principal components of the training windows, also known as Sub-PCA."""
 
     def __init__(self, num_components: int = 20, seed: int = 0):
         self.num_components, self.seed = num_components, seed
@@ -72,11 +67,7 @@ class PCAResidual:
 
 
 class NearestNeighbours:
-    """Mean Euclidean distance of a window to its nearest training windows.
-
-    Args:
-        num_neighbours: Number of nearest training windows.
-    """
+    """Mean Euclidean distance of a window to so many nearest training windows."""
 
     def __init__(self, num_neighbours: int = 5):
         self.num_neighbours = num_neighbours
@@ -97,11 +88,7 @@ class NearestNeighbours:
 
 
 class IsolationForestOnFeatures:
-    """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`.
-
-    Args:
-        seed: Seed for the trees.
-    """
+    """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`."""
 
     def __init__(self, seed: int = 0):
         self.seed = seed
@@ -138,12 +125,9 @@ class OneClassSVMOnFeatures:
 
 
 class JointMeans:
-    """Mahalanobis distance of the means of all channels in equal parts of a window.
+    """Mahalanobis distance of the means of all channels in so many equal parts of a window.
 
     A small change of one channel against the others is large where they hardly move apart otherwise; shrinkage of the covariance would hide it.
-
-    Args:
-        num_parts: Number of parts of a window.
     """
 
     def __init__(self, num_parts: int = 1):
@@ -180,24 +164,24 @@ class JointSize:
         return np.maximum(*(scale.score(windows) / unit for scale, unit in zip(self._scales, self._units, strict=True)))
 
 
-class LargestStep:
-    """Control: the largest absolute first difference. Anomalies that it finds are trivial to detect (Wu and Keogh 2021)."""
+class _Control:
+    """A trivial detector without anything to learn. Anomalies that it finds are trivial to detect (Wu and Keogh 2021)."""
 
-    def fit(self, windows: np.ndarray) -> "LargestStep":
-        """Does nothing: there is nothing to fit."""
+    def fit(self, windows: np.ndarray) -> "_Control":
+        """Does nothing."""
         return self
+
+
+class LargestStep(_Control):
+    """Control: the largest absolute first difference."""
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest absolute first difference of each window, in the unit of the telemetry."""
         return np.abs(np.diff(windows, axis=1)).reshape(len(windows), windows.shape[1] - 1, -1).max(axis=(1, 2))
 
 
-class MovingDeviation:
+class MovingDeviation(_Control):
     """Control: the largest standard deviation of 25 neighbouring samples."""
-
-    def fit(self, windows: np.ndarray) -> "MovingDeviation":
-        """Does nothing: there is nothing to fit."""
-        return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest moving standard deviation of each window, in the unit of the telemetry."""
@@ -209,13 +193,10 @@ class MovingDeviation:
 
 
 class Innovation:
-    """Size of what a linear prediction from the past of all channels, and from the other channels, does not explain.
+    """Size of what a linear prediction from so many past samples of all channels, less in short windows, does not explain.
 
     The prediction is a vector autoregression, fitted by ridge regression; errors are weighed by the inverse of their covariance. A channel
     that loses its relation to the others, or follows them with another delay, is found although its own values look as before.
-
-    Args:
-        order: Number of past samples of each channel; less in short windows.
     """
 
     def __init__(self, order: int = 48):

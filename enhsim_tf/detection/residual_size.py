@@ -1,9 +1,7 @@
-"""Detector of residuals: the size of what a simulator does not explain, with a scale that may follow slow drift within a bound.
+"""Detector of residuals, telemetry minus what a fitted simulator says that it should be: their size, which may grow slowly within a bound.
 
-A residual is telemetry minus what a fitted simulator says that it should be. Its root-mean-square size needs no training, so nothing of a
-fault can be learnt. The size of nominal residuals may change slowly as a channel ages; the score is therefore divided by a factor that
-follows the sizes of past windows. The factor is at least 1 and at most `bound`, so that a residual that is more than `bound` times the
-threshold is an alarm for as long as it lasts.
+The size of nominal residuals may change as a channel ages. The score is therefore divided by a factor that follows the sizes of past windows,
+from 1 to `bound`, so that a residual that is more than `bound` times the threshold is an alarm for as long as it lasts.
 """
 
 import numpy as np
@@ -37,19 +35,14 @@ class ResidualSize:
         return self
 
     def score_sizes(self, sizes: np.ndarray) -> np.ndarray:
-        """Divides sizes of windows, evenly spaced in the order of time, by the factor that is followed; shape `(windows,)`."""
-        return sizes / self.factors(sizes)
-
-    def factors(self, sizes: np.ndarray) -> np.ndarray:
-        """Returns the factor of each window: the median of past sizes in units of the typical one, from 1 to `bound`."""
+        """Divides sizes of windows, evenly spaced in the order of time, by the median of past sizes in units of the typical one."""
         import pandas as pd
 
-        found, first = np.ones(len(sizes)), _OVERLAP + _LEAST_MEMORY
-        if self.bound == 1 or not self.typical > 0 or len(sizes) <= first:
-            return found
-        past = pd.Series(sizes[: -_OVERLAP - 1]).rolling(_MEMORY, min_periods=1).median()
-        found[first:] = past[_LEAST_MEMORY - 1 :] / self.typical
-        return np.clip(found, 1.0, self.bound)
+        factors, first = np.ones(len(sizes)), _OVERLAP + _LEAST_MEMORY
+        if self.typical > 0 and len(sizes) > first:
+            past = pd.Series(sizes[: -_OVERLAP - 1]).rolling(_MEMORY, min_periods=1).median()
+            factors[first:] = past[_LEAST_MEMORY - 1 :] / self.typical
+        return sizes / np.clip(factors, 1.0, self.bound)
 
 
 def root_mean_square(windows: np.ndarray) -> np.ndarray:

@@ -7,11 +7,12 @@ drawn and whose output layer is a ridge regression. The paper's network is train
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
@@ -61,7 +62,7 @@ def choose_enhancer(
     wanted: str = BEST,
     seed: int = 0,
     epochs: int = 6,
-    on_candidate: Callable[[str], None] = lambda name: None,
+    progress: Progress = SILENT,
 ) -> Choice:
     """Judges candidates on held-out time and fits the chosen one to all windows.
 
@@ -72,7 +73,7 @@ def choose_enhancer(
         wanted: Name of a candidate to use whatever the errors are, or `best`.
         seed: Random seed of the network and the random features.
         epochs: Passes of the network over the windows.
-        on_candidate: Called with the name of each candidate before it is fitted.
+        progress: Tells the name of each candidate before it is fitted.
 
     Raises:
         InputError: If the name is unknown, shapes do not match, a value is not finite, or there is too little time.
@@ -93,7 +94,7 @@ def choose_enhancer(
     variance = np.where(variance > 0, variance, 1.0)
     learnt, fitted, squared = _Training(inputs[rows], targets[rows], starts[rows]), {}, {}
     for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
-        on_candidate(name)
+        progress.step(f"enhancer {name}")
         fitted[name] = learnt.fit(name, seed, epochs)
         errors = np.mean((fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
         squared[name] = np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)

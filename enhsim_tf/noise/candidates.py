@@ -52,11 +52,7 @@ def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.n
 
 
 def state_of(model: NoiseModel) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Returns what is saved of a noise model of all channels: its settings in plain JSON types, and its arrays by name.
-
-    Raises:
-        InputError: If it is a model of another class, which is not saved.
-    """
+    """Returns what is saved of a noise model of all channels: its settings in plain JSON types, and its arrays by name."""
     match model:
         case GaussianNoise():
             return {"kind": "gaussian" if model.root.any() else "none", "window": model.window}, {"root": model.root}
@@ -72,11 +68,7 @@ def state_of(model: NoiseModel) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 def model_from(settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> NoiseModel:
-    """Makes a noise model again from what `state_of` returned.
-
-    Raises:
-        ValueError: If they do not describe a noise model, or a number is not finite.
-    """
+    """Makes a noise model again from what `state_of` returned; raises ValueError if that is none, or a number is not finite."""
     if not all(np.isfinite(np.asarray(each, np.float64)).all() for each in arrays.values()):
         raise ValueError("noise that is not finite")
     match settings["kind"]:

@@ -97,14 +97,9 @@ class GaussianAutoregression(_Stationary):
 
     @classmethod
     def fit(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianAutoregression":
-        """Fits by Burg's method (1975), which always gives a stationary process; the Akaike information criterion chooses the order.
+        """Fits to windows of shape `(windows, samples)` by Burg's method (1975), which always gives a stationary process.
 
-        Args:
-            windows: Noise windows of shape `(windows, samples)`.
-            max_order: The largest order that may be chosen.
-
-        Raises:
-            InputError: If the windows are not longer than `max_order`, or if they are constant.
+        The Akaike information criterion chooses the order. Raises InputError if the windows are not longer than `max_order`, or constant.
         """
         if windows.shape[1] <= max_order:
             raise InputError(f"Expected windows of more samples than max_order={max_order}. Received: {windows.shape[1]} samples.")

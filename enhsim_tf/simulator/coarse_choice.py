@@ -120,10 +120,7 @@ def _fitting_window(parts: Sequence[Telemetry], most: int, least: int) -> int | 
 
 
 def _explained_by_commands(parts: Sequence[Telemetry], commands: np.ndarray) -> tuple[CommandTraces | None, float]:
-    """Returns the traces of the commands, and the share of the variance that they explain on held-out blocks of time.
-
-    The share is 0 unless it is larger than with the same commands at other times: slow traces of unrelated commands may follow slow telemetry.
-    """
+    """Returns the traces of the commands, and the share of the variance that they explain on held-out blocks of time; 0 if by chance."""
     rows = np.concatenate([round(part.offset_s) + np.arange(len(part)) for part in parts])
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
     if len(commands) <= rows.max():
@@ -134,6 +131,7 @@ def _explained_by_commands(parts: Sequence[Telemetry], commands: np.ndarray) -> 
         return None, 0.0
     explained = _held_out_share(values, commands)
     shifts = np.linspace(0, len(values), _NUM_SHIFTS + 2)[1:-1].astype(int)
+    # slow traces of unrelated commands may follow slow telemetry
     by_chance = (_held_out_share(values, np.roll(commands, shift, axis=0)) for shift in shifts)
     is_real = explained >= _LEAST_EXPLAINED and all(explained > share for share in by_chance)
     return traces, explained if is_real else 0.0

@@ -46,10 +46,7 @@ class CoarseRun:
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """Channels to fit: together, if there are several. The fields are arguments of `fit_channels`.
-
-    `out` is an absolute path, because a worker may have another working directory.
-    """
+    """Channels to fit, together if there are several. The fields are arguments of `fit_channels`; `out` is absolute."""
 
     series: "Mapping[str, pd.Series]"
     out: Path
@@ -97,8 +94,8 @@ def fit_channels(
         cleaning: Settings of the cleaning.
         tell: Function that is called with each line of output.
         separately: Whether each channel gets a simulator of its own.
-        workers: Number of channels that are fitted at the same time, each in its own process. None: one per CPU; 0: all in this process.
-        engine: How worker processes are run: `local` or `ray`. Neither it nor the number of workers changes the results.
+        workers: Number of processes. None: one per CPU; 0: all in this process. Neither it nor the engine changes the results.
+        engine: How worker processes are run: `local` or `ray`.
         speaks: Whether to print lines of progress.
         run: The recorded run of a coarse simulator, or None.
         commands: Commands of the samples of a single channel, shape `(samples, commands)`, or None.
@@ -169,13 +166,12 @@ def fit_or_say(job: Job) -> Outcome:
 
     cleaned, outcome = {}, Outcome(job.name)
     for name, series in job.series.items():
-        reason = _reason_of(name, lambda name=name, series=series: cleaned.update({name: _cleaned(name, series, job.cleaning)}))
-        outcome.failed |= {name: reason} if reason else {}
+        with _failing(outcome, [name]):
+            cleaned[name] = _cleaned(name, series, job.cleaning)
     outcome.lines += lines_of([each.report for each in cleaned.values()])
     for telemetry in join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []:
-        names = name_of_channels(telemetry.columns)
-        reason = _reason_of(names, lambda telemetry=telemetry: _fit_group(telemetry, cleaned, job, outcome))
-        outcome.failed |= dict.fromkeys(telemetry.columns, reason) if reason else {}
+        with _failing(outcome, telemetry.columns):
+            _fit_group(telemetry, cleaned, job, outcome)
     return outcome
 
 
@@ -189,23 +185,25 @@ def _cleaned(name: str, series: "pd.Series", cleaning: Cleaning) -> "Cleaned":
     return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
 
 
-def _reason_of(name: str, work: Callable[[], None]) -> str | None:
-    """Does work and returns why it could not be done, or None."""
+@contextlib.contextmanager
+def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
+    """Notes why work on channels could not be done."""
     try:
-        work()
+        yield
     except InputError as error:
-        return str(error)
+        outcome.failed |= dict.fromkeys(names, str(error))
     except (OSError, MemoryError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory"
+        name, reason = (
+            name_of_channels(names),
+            getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory",
+        )
         raise InputError(
             f"Expected enough memory and disk space for {printable(name)}. Received: {reason}. Finished channels are kept; free some space."
         ) from error
     except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        reason = " ".join(str(error).split())[:200]
-        place = f"{Path(where.filename).name}, line {where.lineno}"
-        return f"Expected a fit. Received: {type(error).__name__}: {reason}, in {place}. Please report this defect."
-    return None
+        where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
+        said = f"{type(error).__name__}: {reason}, in {Path(where.filename).name}, line {where.lineno}"
+        outcome.failed |= dict.fromkeys(names, f"Expected a fit. Received: {said}. Please report this defect.")
 
 
 def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Job, outcome: Outcome) -> None:

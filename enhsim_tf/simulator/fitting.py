@@ -166,7 +166,7 @@ def _fit_aligned(
     waves, coarse, wanted, kept = _learn_waveforms(waves, targets, times)
     is_level = all(isinstance(each, ConstantLevel) for each in waves.simulators)
     name = options.enhancer if not is_level else COARSE
-    choice = choose_enhancer(coarse, wanted, times[kept], name, options.seed, options.epochs, _told(progress))
+    choice = choose_enhancer(coarse, wanted, times[kept], name, options.seed, options.epochs, progress)
     places = evenly_spaced_starts(series, window, _NUM_LEVELS)
     shift, gain = waves.align(cut(series, places, window))[1:]
     is_flat = waves.is_flat(gain)
@@ -247,7 +247,7 @@ def _fit_runs(
     number = _num_windows(options, window, len(recording.columns))
     starts = evenly_spaced_starts(series, window, number)
     inputs, targets, times = cut(coarse_series, starts, window), cut(series, starts, window), times_of(learnt, starts, window)
-    choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, _told(progress))
+    choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, progress)
     known = None if isinstance(coarse, Recording) else coarse
     alignment = Runs(learnt_run, window, delay.seconds, known, name_of(coarse), commands)
     simulator = EnhancedSimulator(alignment, choice.enhancer, None, recording.columns, recording.interval_s, nominal=learnt)
@@ -257,8 +257,8 @@ def _fit_runs(
         noise, clean = np.split(cut([part.values for part in some.parts], places, window), 2, axis=2)
         return NoiseWindows(noise, clean, times_of(some, places, window))
 
-    everything, *judged = (_evenly(some, window, number, noise_windows) for some in (residuals, *split_end(residuals, JUDGED_SHARE)))
-    return _finish(simulator, choice, judged, everything, options, held_out, held_out_run, said, [*notes, *left_out], progress)
+    everything, *halves = (_evenly(some, window, number, noise_windows) for some in (residuals, *split_end(residuals, JUDGED_SHARE)))
+    return _finish(simulator, choice, halves, everything, options, held_out, held_out_run, said, [*notes, *left_out], progress)
 
 
 def _run_of(coarse: CoarseSimulator, recording: Recording) -> tuple[Recording, list[str]]:
@@ -340,10 +340,6 @@ def _evenly(
 
 
 # both
-
-
-def _told(progress: Progress) -> Any:
-    return lambda name: progress.step(f"enhancer {name}")
 
 
 def _finish(

@@ -96,10 +96,7 @@ def long_enough(recording: Recording | None, window: int) -> Recording | None:
 
 
 def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.ndarray:
-    """Cuts windows out of contiguous series of shape `(samples, columns)`, float32 of shape `(windows, samples, columns)`.
-
-    Starts are counted over all possible starts, as in `telemetry.windows`.
-    """
+    """Cuts windows out of series `(samples, columns)`, float32 of shape `(windows, samples, columns)`; starts as in `telemetry.windows`."""
     usable = [each for each in series if len(each) >= window]
     which, places = places_in_parts(usable, starts, window)
     windows = np.empty((len(starts), window, series[0].shape[1]), np.float32)

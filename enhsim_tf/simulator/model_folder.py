@@ -75,15 +75,9 @@ def refuse_foreign(folder: str | os.PathLike) -> None:
 
 
 def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> None:
-    """Writes a simulator to a folder atomically: if a step fails, the folder is left unchanged. A simulator that was there is replaced.
+    """Writes a simulator to a folder atomically, in place of one that was there: its arrays by part and name, and settings in plain JSON types.
 
-    Args:
-        folder: The folder.
-        arrays: For each part of the simulator, such as `enhancer`, its arrays by name.
-        settings: All other settings, in plain JSON types.
-
-    Raises:
-        InputError: If the folder contains something other than a saved simulator, or if a number is not finite.
+    Raises InputError if the folder contains something else, or if a number is not finite.
     """
     refuse_foreign(folder)
     bad = [part for part, named in arrays.items() if not all(np.isfinite(each).all() for each in named.values())]

@@ -62,6 +62,8 @@ class Scorer:
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
+        # of the generated series, in windows
+        self._length = int(np.clip(_SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS))
         seed = self.options.seed
         if simulator.is_run_model:
             training = simulator.draw_noise(simulator.generate_clean(self.options.num_windows, seed=seed), np.random.default_rng([seed, 3]))
@@ -81,11 +83,6 @@ class Scorer:
         if len(real):
             self.nominal_threshold = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0]
         self.threshold = max(generated, self.nominal_threshold)
-
-    @property
-    def _length(self) -> int:
-        """Length of the generated series in windows."""
-        return int(np.clip(_SERIES_VALUES // (self.window * len(self.simulator.channels)), 100, _THRESHOLD_WINDOWS))
 
     @functools.cached_property
     def nominal_scores(self) -> np.ndarray:
@@ -146,13 +143,9 @@ class Scorer:
         return self.detector.score(self._judged(windows))
 
     def score_series(self, series: np.ndarray) -> np.ndarray:
-        """Scores every sample.
+        """Scores every sample of a series of `EnhancedSimulator.judged_series`, shape `(samples, channels)`, with at least a window of samples.
 
-        Args:
-            series: A series of `EnhancedSimulator.judged_series`, shape `(samples, channels)`, with at least a window of samples.
-
-        Returns:
-            float64 array of shape `(samples,)`, scaled so that the threshold is 1.
+        Returns float64 of shape `(samples,)`, scaled so that the threshold is 1.
         """
         return self._relative(self._raw(np.asarray(series, np.float32)))
 
@@ -217,11 +210,19 @@ def score(
         columns |= dict(zip(names, enhanced.T, strict=True))
     columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
     frame = pd.DataFrame(columns, index=pd.concat([to_series(part) for part in telemetry_of(telemetry)]).index)
-    frame.attrs["counts"] = telemetry.clock().counts
-    departure = find_departure(simulator, scorer.score_series, scores, judged)
+    departure, nominal = find_departure(simulator, scorer.score_series, scores, judged), scorer.nominal_scores
+    num_alarms, edges = len(events_of(nominal > 1, gap=scorer.window)), np.cumsum([0, *map(len, telemetry.parts)])
+    frame.attrs = {
+        "detector": scorer.name,
+        "expected_false_alarm_rate": scorer.rate,
+        "false_alarms_per_day": list(false_alarms_per_day(num_alarms, len(nominal) * simulator.interval_s)),
+        "events": event_rows(scores, edges, nominal, scorer.window, simulator.interval_s, departure and departure.begin),
+        "counts": telemetry.clock().counts,
+        "departure": "",
+    }
     if departure is not None:
         frame["score_after"] = departure.scores
-    _note(frame, scorer, np.cumsum([0, *map(len, telemetry.parts)]), departure)
+        frame.attrs["departure"] = _departure_text(frame, departure)
     return frame
 
 
@@ -259,29 +260,19 @@ def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
     return found
 
 
-def _note(frame: "pd.DataFrame", scorer: Scorer, edges: Sequence[int], departure: Departure | None) -> None:
-    """Notes detector, expected false alarms and events in `frame.attrs`, see `score`."""
-    nominal, interval_s, since = scorer.nominal_scores, scorer.simulator.interval_s, departure and departure.begin
-    num_alarms = len(events_of(nominal > 1, gap=scorer.window))
-    frame.attrs["detector"] = scorer.name
-    frame.attrs["expected_false_alarm_rate"] = scorer.rate
-    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(nominal) * interval_s))
-    frame.attrs["events"] = event_rows(frame["score"].to_numpy(), edges, nominal, scorer.window, interval_s, since)
-    frame.attrs["departure"] = ""
-    if departure is not None:
-        when = told_times(frame, frame.index[[since]])[0]
-        when = f"{when:.10g} s" if isinstance(when, float) else when
-        frame.attrs["departure"] = (
-            f"since {when} the telemetry has left what was learnt and stays there "
-            f"({', '.join(departure.what)}): one event. It is a lasting fault, or the new normal: then go on with `update`. score_after are "
-            "scores against the new operating point."
-        )
+def _departure_text(frame: "pd.DataFrame", departure: Departure) -> str:
+    when = told_times(frame, frame.index[[departure.begin]])[0]
+    when = f"{when:.10g} s" if isinstance(when, float) else when
+    return (
+        f"since {when} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a lasting fault, or "
+        "the new normal: then go on with `update`. score_after are scores against the new operating point."
+    )
 
 
 def event_rows(
     scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: int | None = None
 ) -> list[dict]:
-    """Returns the events in plain JSON types. Flags of a part within a window of each other are one event, as they share windows.
+    """Returns the events in plain JSON types; flags of a part within a window of each other are one event, as they share windows.
 
     `edges` are the first samples of the parts and the number of samples; from the first sample of a departure on, all is one event.
     """
@@ -317,15 +308,11 @@ def told_times(frame: "pd.DataFrame", index: "pd.Index | None" = None) -> "pd.In
 
 
 def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
-    """Returns the events in scores, one row per alarm.
+    """Returns the events in the scores that `score` returns, one row per alarm.
 
-    Args:
-        frame: Scores, as returned by `score`.
-
-    Returns:
-        A data frame with the columns `begin`, `end` and `peak` (times of the first flagged sample, of the sample after the last one, and of the
-        highest score; sample numbers if the telemetry has no times), `duration_s`, `num_flagged`, `score` (the highest score; the threshold is
-        1) and `confidence` (see `events.confidences`). Runs of flags that are at most one window apart are one event; so is a lasting departure.
+    Runs of flags that are at most one window apart are one event; so is a lasting departure. The columns are `begin`, `end` and `peak` (times of
+    the first flagged sample, of the sample after the last one, and of the highest score; sample numbers if the telemetry has no times),
+    `duration_s`, `num_flagged`, `score` (the highest score; the threshold is 1) and `confidence` (see `events.confidences`).
     """
     import pandas as pd
 

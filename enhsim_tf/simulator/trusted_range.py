@@ -22,7 +22,7 @@ _LEAST_LIMIT = 1e-3  # lower bound of the limit, for periodic coarse windows who
 class TrustedRange:
     """The range of a simulator's nominal coarse windows, the only ones on which its enhancer was trained.
 
-    The score is computed from coarse windows only. It cannot detect an error of the coarse simulator itself.
+    It cannot detect an error of the coarse simulator itself.
 
     Args:
         simulator: A simulator fitted to nominal telemetry.
@@ -46,10 +46,7 @@ class TrustedRange:
         return ((windows - self._centre) / self._scale).reshape(len(windows), -1).astype(np.float32)
 
     def score(self, coarse: np.ndarray) -> np.ndarray:
-        """Scores how far coarse windows of shape `(windows, samples, columns)` are outside the training range, float64 of shape `(windows,)`.
-
-        One per cent of nominal windows score above 1.
-        """
+        """Scores coarse windows of shape `(windows, samples, columns)`, float64 of shape `(windows,)`; 1 % of nominal windows are above 1."""
         rows = self._rows(coarse)
         scores = np.sqrt(np.mean(rows**2, axis=1, dtype=np.float64)) if self._range is None else self._range.score(rows)
         return scores / self._limit

@@ -22,7 +22,6 @@ def test_the_factor_is_the_median_of_past_sizes_within_its_bounds():
     for number in range(24, 320):
         past = sizes[max(0, number - 8 - 64) : number - 8]
         expected[number] = min(max(np.median(past), 1.0), 1.5)
-    np.testing.assert_allclose(detector.factors(sizes), expected)
     np.testing.assert_allclose(detector.score_sizes(sizes), sizes / expected)
     np.testing.assert_array_equal(ResidualSize(1).fit_sizes(np.ones(10)).score_sizes(sizes), sizes)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common import training
+from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer import candidates
 from enhsim_tf.enhancer.candidates import block_edges, choose_enhancer, fit_enhancer, judge, split_fold
@@ -157,10 +158,10 @@ def test_the_simplest_sufficient_candidate_is_chosen(target, expected):
 
 
 def test_a_candidate_that_is_asked_for_is_used_whatever_its_error():
-    coarse = series()
-    named = []
-    found = choose_enhancer(*windows_of(coarse, coarse[:, 0] + coarse[:, 1]), LEVEL_AND_GAIN, on_candidate=named.append)
-    assert found.enhancer.name == LEVEL_AND_GAIN and named == [each.name for each in found.judged] == [COARSE, RIDGE, LEVEL_AND_GAIN]
+    coarse, said = series(), []
+    found = choose_enhancer(*windows_of(coarse, coarse[:, 0] + coarse[:, 1]), LEVEL_AND_GAIN, progress=Progress(said.append))
+    assert found.enhancer.name == LEVEL_AND_GAIN and [each.name for each in found.judged] == [COARSE, RIDGE, LEVEL_AND_GAIN]
+    assert said == [f"enhancer {each.name} ..." for each in found.judged]
 
 
 def test_the_comparison_hand_worked():
