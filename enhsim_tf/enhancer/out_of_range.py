@@ -54,10 +54,8 @@ class OutOfRange:
         """Scores coarse windows of shape `(windows, samples)`, float64 of shape `(windows,)`: close to 0 within the training range.
 
         Raises:
-            InputError: If the score is not fitted, the windows have another length, or a value is not finite.
+            InputError: If the windows have another length than in the fit, or a value is not finite.
         """
-        if not hasattr(self, "_mean"):
-            raise InputError("Expected a fitted score. Received: OutOfRange before fit. Call fit with the training windows.")
         windows = _checked(coarse_windows, len(self._mean))
         with threadpool_limits(1):
             chunks = [self._score(windows[begin : begin + _CHUNK]) for begin in range(0, len(windows), _CHUNK)]

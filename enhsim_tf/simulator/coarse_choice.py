@@ -1,7 +1,7 @@
 """Chooses the coarse simulator of a channel: square waves, the commands that its file holds, or a constant level.
 
 Square waves need a period that occurs at least twice. Commands need no period. A constant level is what remains: it knows nothing of
-what comes when, and says so. Only telemetry that is constant or very short is refused.
+what comes when, and says so.
 """
 
 from collections.abc import Sequence
@@ -47,12 +47,10 @@ def choose_coarse(
         refused: Why square waves are not to be used; None if they may be.
 
     Raises:
-        InputError: If the telemetry is constant, or shorter than eight windows.
+        InputError: If the telemetry is shorter than eight windows.
     """
     name, longest = parts[0].name, max(parts, key=len)
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
-    if np.ptp(values) == 0:
-        raise InputError(f"Expected telemetry that varies. Received: {name}, which is constant. Nothing can be learnt from it.")
     if len(values) < LEAST_SAMPLES:
         raise InputError(
             f"Expected at least {LEAST_SAMPLES} samples, {LEAST_LEARNT} windows of {FEWEST_SAMPLES}. Received: {len(values)} of {name}. "
@@ -71,10 +69,9 @@ def choose_coarse(
     wanted = window or default_window(len(values))
     fitting = _fitting_window(parts, wanted, wanted if window else FEWEST_SAMPLES)
     if not fitting:
-        what = f"at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from"
         raise InputError(
-            f"Expected {what}. Received: {len(values)} samples of {name}, the longest part {len(longest)}. "
-            "Give more telemetry or a smaller window."
+            f"Expected at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from. Received: {len(values)} samples of "
+            f"{name}, the longest part {len(longest)}. Give more telemetry or a smaller window."
         )
     about_commands = "its file has no commands"
     if traces is not None and by_commands:

@@ -35,16 +35,6 @@ THREADS = 1  # of a worker
 
 
 @dataclasses.dataclass(frozen=True)
-class CoarseRun:
-    """Where the recorded run of a coarse simulator is; see `recording_files.read_recording` for its columns, time and start."""
-
-    source: str
-    columns: Sequence[str] | None = None
-    time: str | None = None
-    start: str | None = None
-
-
-@dataclasses.dataclass(frozen=True)
 class Job:
     """Channels to fit, together if there are several. The fields are arguments of `fit_channels`; `out` is absolute."""
 
@@ -53,7 +43,7 @@ class Job:
     options: FitOptions
     cleaning: Cleaning
     speaks: bool = False
-    run: CoarseRun | None = None
+    read_run: "Callable[..., Recording] | None" = None
     commands: "np.ndarray | None" = None
 
     @property
@@ -82,7 +72,7 @@ def fit_channels(
     workers: int | None = None,
     engine: str = "local",
     speaks: bool = False,
-    run: CoarseRun | None = None,
+    read_run: "Callable[..., Recording] | None" = None,
     commands: "np.ndarray | None" = None,
 ) -> tuple[dict[str, dict], dict[str, str]]:
     """Fits simulators to channels, saves them together with their reports, and prints the reports.
@@ -97,7 +87,7 @@ def fit_channels(
         workers: Number of processes. None: one per CPU; 0: all in this process. Neither it nor the engine changes the results.
         engine: How worker processes are run: `local` or `ray`.
         speaks: Whether to print lines of progress.
-        run: The recorded run of a coarse simulator, or None.
+        read_run: Reads the run of a coarse simulator, with the argument `interval_s` of `read_recording`; None if there is none.
         commands: Commands of the samples of a single channel, shape `(samples, commands)`, or None.
 
     Returns:
@@ -114,7 +104,7 @@ def fit_channels(
         )
     here, speaks = Path(os.path.abspath(out)), speaks and engine == "local"
     groups = [{name: each} for name, each in series.items()] if separately else [dict(series)]
-    jobs = [Job(group, here, options, cleaning, speaks, run, commands) for group in groups]
+    jobs = [Job(group, here, options, cleaning, speaks, read_run, commands) for group in groups]
     for job in jobs:
         for name in (job.name, *job.series):
             refuse_foreign(folder_of(here, name))
@@ -214,7 +204,9 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
     name = name_of_channels(telemetry.columns)
     progress = Progress(_tell_if_heard, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
     commands = job.commands if len(job.series) == 1 else None
-    simulator, report = fit(telemetry, _run_of(job, telemetry), job.options, progress, commands)
+    interval_s = telemetry.interval_s if telemetry.start is not None else None
+    run = None if job.read_run is None else job.read_run(interval_s=interval_s)
+    simulator, report = fit(telemetry, run, job.options, progress, commands)
     folder = folder_of(job.out, name)
     refuse_foreign(folder)  # checked again, because the fit took time
     instead = ", in place of the one that was there" if (folder / MANIFEST).is_file() else ""
@@ -227,15 +219,6 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
     here = os.path.relpath(folder)
     shown = folder if here.startswith("..") else here  # from here, its full path if it is elsewhere
     outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/{instead}"]
-
-
-def _run_of(job: Job, telemetry: "Recording") -> "Recording | None":
-    if job.run is None:
-        return None
-    from enhsim_tf.coarse_simulator.recording_files import read_recording
-
-    interval_s = telemetry.interval_s if telemetry.start is not None else None
-    return read_recording(job.run.source, job.run.columns, job.run.time, job.cleaning.of_run(min_part=2), interval_s, job.run.start)
 
 
 def _tell_if_heard(line: str) -> None:
