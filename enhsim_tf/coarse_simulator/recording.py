@@ -60,6 +60,11 @@ class Recording:
     def __len__(self) -> int:
         return sum(map(len, self.parts))
 
+    @property
+    def values(self) -> np.ndarray:
+        """The values of all parts, one after another, float32 of shape `(samples, columns)`."""
+        return np.concatenate([part.values for part in self.parts])
+
     def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
         """Returns what was recorded, as `at`; raises InputError if a scenario is given or a time is not covered."""
         if scenario is not None:

@@ -27,8 +27,8 @@ BUILT_IN = {
 """Maps each detector's name to the path `module:class` of its class, the simplest detector first and the networks last."""
 
 RESIDUAL = "residual"
-"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`residual_size`). It needs a
-simulator, so it is no member of `DETECTORS`."""
+"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`detectors.ResidualSize`). It needs
+a simulator, so it is no member of `DETECTORS`."""
 
 
 def _build(path: str, seed: int) -> "Detector":

@@ -105,11 +105,7 @@ def choose_enhancer(
 
 
 def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
-    """Compares candidates by their errors on the same held-out stretches of time.
-
-    Args:
-        squared: For each candidate, the mean squared error on each stretch, divided by the targets' variance, shape `(stretches,)`.
-    """
+    """Compares candidates by their mean squared errors, in units of the targets' variance, on the same held-out stretches of time."""
     best = min(squared, key=lambda name: np.mean(squared[name]))
     judged = []
     for name, errors in squared.items():
@@ -258,14 +254,7 @@ def _checked(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -> tup
 
 
 def block_edges(begin: int, end: int, window: int) -> np.ndarray:
-    """Cuts the samples from `begin` to before `end` into contiguous blocks of about equal length, on which enhancers are judged.
-
-    Returns:
-        The edges in samples, in ascending order; block `b` covers the samples from `edges[b]` to before `edges[b + 1]`.
-
-    Raises:
-        InputError: If a block would be shorter than a window.
-    """
+    """Returns the edges of contiguous blocks of about equal length between two samples; raises InputError if one is shorter than a window."""
     num_blocks = int(np.clip((end - begin) // (_WINDOWS_IN_BLOCK * window), NUM_FOLDS, _MOST_BLOCKS))
     edges = np.linspace(begin, end, num_blocks + 1).round().astype(np.int64)
     if np.diff(edges).min() < window:
@@ -277,16 +266,9 @@ def block_edges(begin: int, end: int, window: int) -> np.ndarray:
 
 
 def split_fold(starts: np.ndarray, window: int, edges: np.ndarray, fold: int) -> tuple[np.ndarray, np.ndarray]:
-    """Splits windows, which may overlap, into training windows and held-out windows that share no sample.
+    """Splits windows, which may overlap, into training windows and held-out windows that share no sample; returns the indices of both.
 
-    Args:
-        starts: First sample of each window, shape `(windows,)`, in any order.
-        window: Length of a window in samples.
-        edges: Edges of the blocks, as returned by `block_edges`.
-        fold: Number of the fold, from 0. Block `b` is held out if `b % NUM_FOLDS == fold`.
-
-    Returns:
-        The indices of the training and of the held-out windows. A window across the edge of a held-out block is in neither set.
+    Block `b` is held out if `b % NUM_FOLDS == fold`. A window across the edge of a held-out block is in neither set.
     """
     starts = np.asarray(starts)
     inside, touched = np.zeros((2, len(starts)), bool)

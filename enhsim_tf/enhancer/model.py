@@ -25,14 +25,7 @@ class Enhancer:
     main: tuple[np.ndarray, np.ndarray] | None = None  # for candidates that keep the coarse shape: the column of each channel, and its gain
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
-        """Maps coarse windows to enhanced windows.
-
-        Args:
-            inputs: Coarse windows, shape `(windows, samples, columns)`.
-
-        Returns:
-            float32 array of shape `(windows, samples, channels)`.
-        """
+        """Maps coarse windows of shape `(windows, samples, columns)` to enhanced windows, float32 of shape `(windows, samples, channels)`."""
         outputs = np.empty((len(inputs), self.window, self.channels), np.float32)
         for first in range(0, len(inputs), _CHUNK):
             self._map(np.asarray(inputs[first : first + _CHUNK], np.float32) - self.centre, outputs[first : first + _CHUNK])
@@ -98,16 +91,9 @@ def run_starts(num_samples: int, window: int, hop: int | None = None) -> np.ndar
 
 
 def average_windows(windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int) -> np.ndarray:
-    """Averages overlapping windows into one continuous series, with weights that fall to zero at both ends of a window.
+    """Averages overlapping windows into one series `(num_samples, channels)`, with weights that fall to zero at both ends of a window.
 
-    Args:
-        windows_at: Function from a slice of the window numbers to these windows, shape `(windows, window, channels)`.
-        starts: Start of each window in samples, shape `(windows,)`.
-        window: Length of a window in samples.
-        num_samples: Length of the series.
-
-    Returns:
-        float32 array of shape `(num_samples, channels)`.
+    `windows_at` returns some of the windows, given by a slice of their numbers, and `starts` are their first samples.
     """
     fade = (np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2)[:, None]
     series, total = None, np.zeros((num_samples, 1))

@@ -24,16 +24,10 @@ class NoiseModel(Protocol):
 
 
 def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.ndarray | None = None) -> NoiseModel:
-    """Fits a noise model.
+    """Fits a noise model, one of `names.CANDIDATES`, to windows of noise; raises InputError if it cannot be fitted to this noise.
 
-    Args:
-        name: One of `names.CANDIDATES`.
-        noise: Windows of noise of shape `(windows, samples, channels)`, or without the last axis, in the unit of the telemetry.
-        signal: The enhanced signal below them, of the same shape.
-        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
-
-    Raises:
-        InputError: If there is no model of that name, or if it cannot be fitted to this noise.
+    Noise and the enhanced signal below it have the shape `(windows, samples, channels)`, or no last axis. `starts` are the first samples of the
+    windows; None: no two overlap.
     """
     window = noise.shape[1]
     match name:

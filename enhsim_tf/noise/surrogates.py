@@ -22,12 +22,7 @@ class _Stationary:
 
 
 class GaussianNoise(_Stationary):
-    """White Gaussian noise with the standard deviations of the real noise and its correlation between channels.
-
-    Args:
-        root: A root of the channels' covariance `root @ root.T`, shape `(channels, channels)`; or the deviation of a single channel.
-        window: Number of samples in a window.
-    """
+    """White Gaussian noise with the covariance `root @ root.T` between channels; of a single channel the root may be its deviation."""
 
     def __init__(self, root: np.ndarray | float, window: int):
         self.root, self.window = np.asarray(root, np.float64), int(window)
@@ -53,12 +48,7 @@ def _root(covariance: np.ndarray) -> np.ndarray:
 
 
 class JointAutoregression(_Stationary):
-    """Gaussian autoregressive noise of several channels: one `GaussianAutoregression` each, with correlated innovations.
-
-    Args:
-        channels: The autoregression of each channel.
-        correlation: Correlation of their innovations, shape `(channels, channels)`.
-    """
+    """Gaussian autoregressive noise of several channels: one `GaussianAutoregression` each, with innovations of this correlation."""
 
     def __init__(self, channels: "Sequence[GaussianAutoregression]", correlation: np.ndarray):
         self.channels, self.correlation = tuple(channels), np.asarray(correlation, np.float64)

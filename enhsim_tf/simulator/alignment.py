@@ -13,7 +13,7 @@ from enhsim_tf.coarse_simulator.pairing import pair_with_recording
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, waves_or_level
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.simulator.joint import cut, long_enough, telemetry_of
+from enhsim_tf.simulator.joint import cut, long_enough, telemetry_of, windows_of
 from enhsim_tf.telemetry.windows import num_window_starts
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
@@ -250,18 +250,15 @@ class Runs:
         return pair_recordings(telemetry, self.usable(run), self.delay_s, self.window)
 
     def draw(self, starts: np.ndarray, scenarios: Sequence[Any], rng: np.random.Generator) -> Drawn:
-        """Cuts coarse windows out of the nominal run; `starts` count its possible windows and begin again after the last.
-
-        Raises InputError for a scenario, because a recorded run is nominal.
-        """
+        """Cuts coarse windows out of the nominal run, whose possible starts are counted again and again; raises InputError for a scenario."""
         for scenario in scenarios:
             if scenario is not None:
                 raise InputError(
                     f"Expected a recorded run of the scenario for a model of recorded runs. Received: {str(scenario)[:80]}. "
                     "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
                 )
-        parts = [part.values for part in self.usable(self.nominal).parts]
-        windows = cut(parts, np.asarray(starts) % num_window_starts(parts, self.window), self.window)
+        run = self.usable(self.nominal)
+        windows = windows_of(run, np.asarray(starts) % num_window_starts(run.parts, self.window), self.window)
         return Drawn(windows, windows)
 
     @property

@@ -12,24 +12,22 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, replace_folder, write_json
 from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
+from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.options import FitOptions
-from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
-
-if TYPE_CHECKING:
-    import numpy as np
-    import pandas as pd
-
-    from enhsim_tf.coarse_simulator.recording import Recording
-    from enhsim_tf.telemetry.cleaning.clean import Cleaned
+from enhsim_tf.telemetry.series import check_values
 
 THREADS = 1  # of a worker
 
@@ -38,13 +36,13 @@ THREADS = 1  # of a worker
 class Job:
     """Channels to fit, together if there are several. The fields are arguments of `fit_channels`; `out` is absolute."""
 
-    series: "Mapping[str, pd.Series]"
+    series: Mapping[str, pd.Series]
     out: Path
     options: FitOptions
     cleaning: Cleaning
     speaks: bool = False
-    read_run: "Callable[..., Recording] | None" = None
-    commands: "np.ndarray | None" = None
+    read_run: Callable[..., Recording] | None = None
+    commands: np.ndarray | None = None
 
     @property
     def name(self) -> str:
@@ -63,7 +61,7 @@ class Outcome:
 
 
 def fit_channels(
-    series: "Mapping[str, pd.Series]",
+    series: Mapping[str, pd.Series],
     out: str | os.PathLike,
     options: FitOptions,
     cleaning: Cleaning,
@@ -72,8 +70,8 @@ def fit_channels(
     workers: int | None = None,
     engine: str = "local",
     speaks: bool = False,
-    read_run: "Callable[..., Recording] | None" = None,
-    commands: "np.ndarray | None" = None,
+    read_run: Callable[..., Recording] | None = None,
+    commands: np.ndarray | None = None,
 ) -> tuple[dict[str, dict], dict[str, str]]:
     """Fits simulators to channels, saves them together with their reports, and prints the reports.
 
@@ -114,8 +112,7 @@ def fit_channels(
     in_this_process = workers == 0 or (len(jobs) == 1 and engine == "local")
     try:
         for outcome in map(fit_or_say, jobs) if in_this_process else _fitted_by_processes(jobs, engine, workers):
-            reports |= outcome.reports
-            failed |= outcome.failed
+            reports, failed = reports | outcome.reports, failed | outcome.failed
             for line in outcome.lines:
                 tell(line)
     finally:
@@ -139,11 +136,8 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
             if not suspects:
                 raise
             if len(some) == 1:
-                reason = (
-                    "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory. "
-                    "Give less telemetry."
-                )
-                yield Outcome(some[0].name, failed=dict.fromkeys(some[0].series, reason))
+                what = "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory."
+                yield Outcome(some[0].name, failed=dict.fromkeys(some[0].series, f"{what} Give less telemetry."))
                 continue
             batches += [(list(waiting.values()), workers)] if waiting else []
             # one at a time, to find the one that kills its worker, and to give it all the memory
@@ -152,8 +146,6 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
 
 def fit_or_say(job: Job) -> Outcome:
     """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
-    from enhsim_tf.simulator.joint import join_channels
-
     cleaned, outcome = {}, Outcome(job.name)
     for name, series in job.series.items():
         with _failing(outcome, [name]):
@@ -165,11 +157,7 @@ def fit_or_say(job: Job) -> Outcome:
     return outcome
 
 
-def _cleaned(name: str, series: "pd.Series", cleaning: Cleaning) -> "Cleaned":
-    import numpy as np
-
-    from enhsim_tf.telemetry.series import check_values
-
+def _cleaned(name: str, series: pd.Series, cleaning: Cleaning) -> Cleaned:
     cleaned = clean(series, cleaning)
     check_values(np.concatenate([part.values for part in cleaned.parts]), name)
     return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
@@ -183,12 +171,10 @@ def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
     except InputError as error:
         outcome.failed |= dict.fromkeys(names, str(error))
     except (OSError, MemoryError) as error:
-        name, reason = (
-            name_of_channels(names),
-            getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory",
-        )
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory"
         raise InputError(
-            f"Expected enough memory and disk space for {printable(name)}. Received: {reason}. Finished channels are kept; free some space."
+            f"Expected enough memory and disk space for {printable(name_of_channels(names))}. Received: {reason}. Finished channels are kept; "
+            "free some space."
         ) from error
     except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
         where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
@@ -196,7 +182,7 @@ def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
         outcome.failed |= dict.fromkeys(names, f"Expected a fit. Received: {said}. Please report this defect.")
 
 
-def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Job, outcome: Outcome) -> None:
+def _fit_group(telemetry: Recording, cleaned: Mapping[str, Cleaned], job: Job, outcome: Outcome) -> None:
     """Fits and saves one simulator. Nothing is written if a step fails."""
     from enhsim_tf.simulator.figures import report_figure
     from enhsim_tf.simulator.fitting import fit

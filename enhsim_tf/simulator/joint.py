@@ -107,6 +107,11 @@ def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.nda
     return windows
 
 
+def windows_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarray:
+    """Cuts windows out of the parts of a recording, see `cut`."""
+    return cut([part.values for part in recording.parts], starts, window)
+
+
 def times_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarray:
     """Returns the first sample of each window on the clock of the recording, integers of shape `(windows,)`."""
     usable = [part for part in recording.parts if len(part) >= window]

@@ -11,7 +11,7 @@ from enhsim_tf.common.errors import printable, spoken
 from enhsim_tf.enhancer.candidates import Choice, fit_enhancer
 from enhsim_tf.enhancer.names import COARSE
 from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
-from enhsim_tf.simulator.joint import cut, nrmse
+from enhsim_tf.simulator.joint import nrmse, windows_of
 from enhsim_tf.simulator.noise_choice import TOLD_APART
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
@@ -175,9 +175,9 @@ def _coarse_signal(simulator: EnhancedSimulator, real: np.ndarray, run: Recordin
     if run is None:
         coarse, shift, gain = simulator.alignment.align(real)
         return shift[:, None] + gain[:, None] * coarse, None
-    series, trusted = [part.values for part in run.parts], TrustedRange(simulator)
-    coarse = cut(series, evenly_spaced_starts(series, simulator.window, _NUM_WINDOWS), simulator.window)
-    outside = np.concatenate([trusted.score_run(each) for each in series]) > 1
+    trusted, starts = TrustedRange(simulator), evenly_spaced_starts(run.parts, simulator.window, _NUM_WINDOWS)
+    coarse = windows_of(run, starts, simulator.window)
+    outside = np.concatenate([trusted.score_run(part.values) for part in run.parts]) > 1
     return fit_enhancer(COARSE, coarse, real, np.arange(len(real))).predict(coarse), float(outside.mean())
 
 

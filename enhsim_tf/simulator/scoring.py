@@ -10,29 +10,26 @@ import itertools
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
-from enhsim_tf.detection.detectors import JointSize
+from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_square
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import RESIDUAL, all_detectors
-from enhsim_tf.detection.residual_size import ResidualSize, root_mean_square
 from enhsim_tf.enhancer.model import run_starts
 from enhsim_tf.simulator.joint import cut, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.trusted_range import TrustedRange
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.windows import mean_over_windows
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; only scores a window apart are independent
 _STRIDES = 8  # number of scored windows that begin within one window length
@@ -57,7 +54,7 @@ class Scorer:
 
     def __init__(self, simulator: EnhancedSimulator, options: ScoreOptions | None = None):
         self.simulator, self.options = simulator, options or ScoreOptions()
-        self.window, self.stride = simulator.window, max(1, simulator.window // _STRIDES)
+        self.window = simulator.window
         self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", DEFAULT))).detector
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
@@ -104,8 +101,10 @@ class Scorer:
         most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, kept)))
 
         def middle(recording: Recording) -> Recording:
-            firsts = [max(0, (len(part) - most) // 2) for part in recording.parts]
-            parts = [Run(part.values[first : first + most]) for part, first in zip(recording.parts, firsts, strict=True)]
+            parts = []
+            for part in recording.parts:
+                first = max(0, (len(part) - most) // 2)
+                parts.append(Run(part.values[first : first + most]))
             return dataclasses.replace(recording, parts=tuple(parts))
 
         series = self.simulator.judged_series(middle(nominal), None if run is None else middle(run))
@@ -119,7 +118,7 @@ class Scorer:
 
     def _raw(self, series: np.ndarray) -> np.ndarray:
         """Scores each sample of a series of shape `(samples, channels)`, without dividing by the threshold."""
-        begins = run_starts(len(series), self.window, self.stride)
+        begins = run_starts(len(series), self.window, max(1, self.window // _STRIDES))
         step = max(1, _CHUNK_VALUES // (self.window * series.shape[1]))
         chunks = (begins[first : first + step] for first in range(0, len(begins), step))
         scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
@@ -150,7 +149,7 @@ class Scorer:
         return self._relative(self._raw(np.asarray(series, np.float32)))
 
     def _relative(self, scores: np.ndarray) -> np.ndarray:
-        # with a threshold that is not positive, the scores are shifted instead
+        """Scores beside the threshold, from which they are shifted if it is not positive."""
         return scores / self.threshold if self.threshold > 0 else 1 + scores - self.threshold
 
 
@@ -160,7 +159,7 @@ def score(
     telemetry: Recording,
     run: Recording | None = None,
     options: ScoreOptions | None = None,
-) -> "pd.DataFrame":
+) -> pd.DataFrame:
     """Scores every sample of telemetry.
 
     Args:
@@ -180,14 +179,10 @@ def score(
     Raises:
         InputError: If channels, interval or run do not fit to the simulator, or if every part is shorter than a window.
     """
-    import pandas as pd
-
-    from enhsim_tf.simulator.trusted_range import TrustedRange
-
     check_fits(simulator, telemetry, run)
     scorer = Scorer(simulator, options)
     trusted = None if run is None else TrustedRange(simulator)
-    values = np.concatenate([part.values for part in telemetry.parts])
+    values = telemetry.values
     scores, outside = np.full((2, len(values)), np.nan)
     enhanced, judged = np.full(values.shape, np.nan, np.float32), []
     for place, coarse in _stretches(simulator, telemetry, run):
@@ -260,7 +255,7 @@ def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
     return found
 
 
-def _departure_text(frame: "pd.DataFrame", departure: Departure) -> str:
+def _departure_text(frame: pd.DataFrame, departure: Departure) -> str:
     when = told_times(frame, frame.index[[departure.begin]])[0]
     when = f"{when:.10g} s" if isinstance(when, float) else when
     return (
@@ -297,25 +292,21 @@ def event_rows(
     ]
 
 
-def told_times(frame: "pd.DataFrame", index: "pd.Index | None" = None) -> "pd.Index":
+def told_times(frame: pd.DataFrame, index: pd.Index | None = None) -> pd.Index:
     """Returns times of scores, those of all samples if none are given, as they are written: of a clock that counts from zero in seconds."""
-    import pandas as pd
-
     index = frame.index if index is None else index
     if not frame.attrs["counts"]:
         return index
     return pd.Index((index - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1), name=index.name)
 
 
-def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
+def events_table(frame: pd.DataFrame) -> pd.DataFrame:
     """Returns the events in the scores that `score` returns, one row per alarm.
 
     Runs of flags that are at most one window apart are one event; so is a lasting departure. The columns are `begin`, `end` and `peak` (times of
     the first flagged sample, of the sample after the last one, and of the highest score; sample numbers if the telemetry has no times),
     `duration_s`, `num_flagged`, `score` (the highest score; the threshold is 1) and `confidence` (see `events.confidences`).
     """
-    import pandas as pd
-
     names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence"]
     table = pd.DataFrame(frame.attrs["events"], columns=names)
     index, begin, end = frame.index, table["begin"].to_numpy(int), table["end"].to_numpy(int)
@@ -332,12 +323,12 @@ def events_path(path: str | os.PathLike) -> Path:
     return Path(path).with_suffix(".events.csv")
 
 
-def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
+def write_scores(path: str | os.PathLike, frame: pd.DataFrame) -> None:
     """Writes what `score` returns to a `.parquet` or `.csv` file, and the events to `events_path`. Both files appear when they are complete."""
+    plain = frame.set_axis(told_times(frame))
+    plain.attrs = {}  # Parquet would store them as JSON
     with replace_file(path) as temporary, replace_file(events_path(path)) as events:
         events_table(frame).to_csv(events, index=False)
-        plain = frame.set_axis(told_times(frame))
-        plain.attrs = {}  # Parquet would store them as JSON
         if Path(path).suffix == ".csv":
             plain.to_csv(temporary)
         else:

@@ -20,7 +20,7 @@ from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.noise.candidates import NoiseModel, model_from, state_of
 from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs, Waves, arrays_of_recording, recording_of
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
-from enhsim_tf.simulator.joint import cut, rounded
+from enhsim_tf.simulator.joint import cut, rounded, windows_of
 from enhsim_tf.simulator.model_folder import read_saved, write_saved
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
@@ -90,14 +90,12 @@ class EnhancedSimulator:
     @functools.cached_property
     def noise_sd(self) -> np.ndarray:
         """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
-        noise = self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0))
-        return np.std(noise, axis=(0, 1), dtype=np.float64)
+        return np.std(self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0)), axis=(0, 1), dtype=np.float64)
 
     @functools.cached_property
     def scale(self) -> np.ndarray:
         """Standard deviation of the generated telemetry of each channel, shape `(channels,)`; 1 for a constant one."""
-        deviation = np.std(self.generate_clean(_NUM_NOISE), axis=(0, 1), dtype=np.float64)
-        deviation = np.hypot(deviation, self.noise_sd)
+        deviation = np.hypot(np.std(self.generate_clean(_NUM_NOISE), axis=(0, 1), dtype=np.float64), self.noise_sd)
         return np.where(deviation > 0, deviation, 1.0)
 
     # enhancement
@@ -108,9 +106,9 @@ class EnhancedSimulator:
         `shift` and `gain` are offset and factor of each window and channel, shape `(windows, channels)`. The result is float32 of shape
         `(windows, samples, channels)`, in the telemetry's unit. Raises InputError if the shape is wrong or a value is not finite.
         """
-        expected = (self.window, self.enhancer.columns)
-        if np.ndim(coarse) != 3 or np.shape(coarse)[1:] != expected:
-            raise InputError(f"Expected coarse windows of shape (windows, {expected[0]}, {expected[1]}). Received: {np.shape(coarse)}.")
+        columns = self.enhancer.columns
+        if np.ndim(coarse) != 3 or np.shape(coarse)[1:] != (self.window, columns):
+            raise InputError(f"Expected coarse windows of shape (windows, {self.window}, {columns}). Received: {np.shape(coarse)}.")
         enhanced = self.enhancer.predict(coarse)
         if shift is not None and gain is not None:
             enhanced *= gain[:, None].astype(np.float32)
@@ -136,9 +134,8 @@ class EnhancedSimulator:
         The gain may leave the range of the training by at most a factor of 2, so that a channel that stands still is not explained.
         """
         coarse, _, gain = self.alignment.align(targets)
-        enhanced = self.enhance(coarse)
-        bounded = np.clip(gain, self.levels[:, :, 1].min(axis=0) / 2, self.levels[:, :, 1].max(axis=0) * 2)[:, None]
-        left = targets - bounded * enhanced
+        learnt = self.levels[:, :, 1]
+        left = targets - np.clip(gain, learnt.min(axis=0) / 2, learnt.max(axis=0) * 2)[:, None] * self.enhance(coarse)
         return (left - left.mean(axis=1, keepdims=True)).astype(np.float32)
 
     def windows_and_signal(self, telemetry: Recording, run: Recording | None, number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -146,9 +143,8 @@ class EnhancedSimulator:
 
         For recorded runs, `run` is the coarse run with the same parts.
         """
-        series = [part.values for part in telemetry.parts]
-        starts = evenly_spaced_starts(series, self.window, number)
-        windows = cut(series, starts, self.window)
+        starts = evenly_spaced_starts(telemetry.parts, self.window, number)
+        windows = windows_of(telemetry, starts, self.window)
         if run is None:
             return windows, self.enhance(*self.alignment.align(windows))
         return windows, cut([self.enhance_run(part.values) for part in run.parts], starts, self.window)
@@ -190,23 +186,18 @@ class EnhancedSimulator:
         """
         return self._joined(num_windows, self.generate_labelled_chunks(num_windows, scenario, seed))
 
-    def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
-        """Returns the windows of `generate` before noise is added."""
-        return self._joined(num_windows, self._chunks(num_windows, scenario, seed, None))
+    def generate_clean(self, num_windows: int, seed: int = 0) -> np.ndarray:
+        """Returns the nominal windows of `generate` before noise is added."""
+        return self._joined(num_windows, self.generate_labelled_chunks(num_windows, None, seed, with_noise=False))
 
     def generate_labelled_chunks(
-        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0
+        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0, with_noise: bool = True
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yields the windows of `generate` in chunks, each with a mask of the samples that the scenario has changed.
 
         Memory does not grow with the number of windows. A sample that is not marked equals that of the same seed without a scenario.
         """
-        return self._chunks(num_windows, scenario, seed, np.random.default_rng([seed, 1]))
-
-    def _chunks(
-        self, num_windows: int, scenario: Degraded | None, seed: int, noise_rng: np.random.Generator | None
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        rng = np.random.default_rng(seed)
+        rng, noise_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1]) if with_noise else None
         starts = rng.integers(0, START_RANGE, num_windows)
         rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
         chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
