@@ -13,6 +13,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.interface import check_columns
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.size_limits import short_reason
 
 
 class FmuSimulator:
@@ -49,7 +50,9 @@ class FmuSimulator:
         try:
             description = fmpy.read_model_description(str(path))
         except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions, and those of zip and XML
-            raise InputError(f"Expected an FMU. Received: {self.name}, which cannot be read ({_reason(error)}). Export it again.") from None
+            raise InputError(
+                f"Expected an FMU. Received: {self.name}, which cannot be read ({short_reason(error)[:160]}). Export it again."
+            ) from None
         self._variables = {variable.name: variable.causality for variable in description.modelVariables}
         self._check_names(self.columns, "output", None)
         self._check_names(self.parameters, "parameter", "parameter")
@@ -81,7 +84,7 @@ class FmuSimulator:
             )
         except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions for whatever goes wrong in the tool's code
             raise InputError(
-                f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {_reason(error)}. Correct the model."
+                f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {short_reason(error)[:160]}. Correct the model."
             ) from None
         places = np.searchsorted(found["time"], time_s + 1e-6 * step_s, "right") - 1  # an FMU may report events in between
         if len(found) < 2 or np.abs(found["time"][places] - time_s).max() > 1e-3 * step_s:
@@ -95,8 +98,3 @@ class FmuSimulator:
             if name not in self._variables or causality not in (None, self._variables[name]):
                 known = [each for each, what in self._variables.items() if causality in (None, what)]
                 raise InputError(f"Expected the name of a variable ({kind}) of {self.name}: {', '.join(known)[:160]}. Received: {name!r}.")
-
-
-def _reason(error: Exception) -> str:
-    """The first line of an exception of FMPy, shortened."""
-    return (str(error).splitlines() or [type(error).__name__])[0][:160]

@@ -106,7 +106,7 @@ class SquareWaveSimulator:
         return degrade(self, np.asarray(time_s, np.float64), scenario, self.levels, self.shortest_period_s, rng).astype(np.float32)
 
     def run(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates one run, see `interface.CoarseSimulator.run`; returns a float32 array of shape `(samples, 1)`."""
+        """Simulates one run, float32 of shape `(samples, 1)`, see `interface.CoarseSimulator.run`."""
         return self.simulate(np.asarray(time_s, np.float64)[None], scenario, rng)[0][:, None]
 
     @classmethod

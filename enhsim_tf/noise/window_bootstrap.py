@@ -28,9 +28,6 @@ class WindowBootstrap:
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
         starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
-
-    Raises:
-        InputError: If there is no window, a value is not finite, or `starts` are not a whole number for each window.
     """
 
     def __init__(self, windows: np.ndarray, starts: np.ndarray | None = None):

@@ -14,7 +14,7 @@ import numpy as np
 
 from enhsim_tf.common.atomic_files import encode_name, replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json
+from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json, short_reason
 
 MANIFEST, _SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
 _MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
@@ -145,5 +145,4 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, Mapping[s
             raise ValueError("the simulator was replaced while it was read; try again")
         return make(arrays, settings)
     except READ_ERRORS as error:
-        reason = (str(error).splitlines() or [""])[0]
-        raise InputError(f"Expected the arrays and settings of a model. Received: {folder} ({reason}).") from None
+        raise InputError(f"Expected the arrays and settings of a model. Received: {folder} ({short_reason(error)}).") from None

@@ -34,9 +34,7 @@ class Report:
     enhancers: list[dict[str, Any]]  # `name`, `error` (NRMSE), `standard_error` and `is_chosen` of each that was judged
     nrmse: dict[str, dict[str, float]]  # of each channel, the error of `coarse` and `enhanced` in standard deviations of the telemetry
     noise_model: str
-    noise_candidates: list[
-        dict[str, Any]
-    ]  # of `noise_choice.choose_noise`; empty if the model was asked for, or there was too little to judge on
+    noise_candidates: list[dict[str, Any]]  # of `noise_choice.choose_noise`; empty if the model was asked for or could not be judged
     cross_correlation: dict[str, Any]  # of several channels, see `_cross_correlation`
     detectors: list[dict[str, Any]]  # see `detector_choice.JudgedDetector`
     detector: str  # the one that `score` uses

@@ -292,7 +292,7 @@ class EnhancedSimulator:
         return values, mask, _changed_events(mask.any(axis=1), events)
 
     def _join_series(self, coarse: np.ndarray, levels: np.ndarray) -> np.ndarray:
-        """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
+        """Enhances a coarse series in windows that overlap by half, and cross-fades them."""
         starts = np.arange(0, len(coarse) - self.window + 1, self.window // 2)
 
         def windows_at(rows: slice) -> np.ndarray:

@@ -26,9 +26,7 @@ class UpdateReport:
     channels: list[str]
     num_samples: int
     num_held_out: int
-    before: dict[
-        str, Any
-    ]  # `level`, `gain`, `period_s`, `noise_sd` and `nrmse` of each channel by name, and `alarms`, the share of flagged samples
+    before: dict[str, Any]  # `level`, `gain`, `period_s`, `noise_sd` and `nrmse` by channel, and `alarms`, the share of flagged samples
     after: dict[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
