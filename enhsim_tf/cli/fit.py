@@ -1,6 +1,7 @@
 """`enhsim-tf fit`: fits a simulator to the channels of telemetry."""
 
 import argparse
+import functools
 import json
 
 from enhsim_tf.cli.options import cleaning_options, refuse_without, tell_failed
@@ -18,18 +19,22 @@ def run_fit(options: argparse.Namespace) -> int:
 
     workers = parse_workers(options.workers, options.engine)
     cleaning = cleaning_options(options, options.window or 32, "missing")
-    from enhsim_tf.simulator.fit_many import CoarseRun, fit_channels  # imported here, because pandas is slow to import
+    from enhsim_tf.coarse_simulator.recording_files import read_recording  # imported here, because pandas is slow to import
+    from enhsim_tf.simulator.fit_many import fit_channels
     from enhsim_tf.telemetry.arrays import read_commands
     from enhsim_tf.telemetry.sources import read_source
 
     speaks = not options.json
     say = tell if speaks else lambda line: None
     say("reading ...")
-    run = None if options.coarse is None else CoarseRun(options.coarse, options.coarse_column, options.coarse_time, options.coarse_start)
+    read_run = None
+    if options.coarse is not None:
+        given = options.coarse, options.coarse_column, options.coarse_time, cleaning.of_run(min_part=2)
+        read_run = functools.partial(read_recording, *given, start=options.coarse_start)
     series = read_source(options.source, options.column, options.time, cleaning)
-    commands = None if run is not None else read_commands(options.source, options.column)
+    commands = None if read_run is not None else read_commands(options.source, options.column)
     reports, failed = fit_channels(
-        series, options.out, chosen, cleaning, say, options.separately, workers, options.engine, speaks, run, commands
+        series, options.out, chosen, cleaning, say, options.separately, workers, options.engine, speaks, read_run, commands
     )
     if options.json:
         tell(json.dumps(reports))

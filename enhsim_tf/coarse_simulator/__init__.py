@@ -1,4 +1,1 @@
-"""The coarse simulator (section 2.1 of the paper): square waves, their fit to telemetry, and degraded modes.
-
-This package depends on telemetry, but not on networks, noise or detectors.
-"""
+"""The coarse simulator (section 2.1 of the paper): square waves, their fit to telemetry, and degraded modes; runs of a user's simulator."""

@@ -22,14 +22,7 @@ _LEAST_SENT = 5  # times that such a command was sent
 
 
 class CommandTraces:
-    """Traces of chosen commands.
-
-    Args:
-        chosen: For each trace, the number of the command (from 1, as the columns of the array) and its decay in samples, or `HELD`.
-
-    Raises:
-        InputError: If there is none.
-    """
+    """Traces of chosen commands: of each the number, from 1 as the columns of the array, and its decay in samples, or `HELD`."""
 
     def __init__(self, chosen: Sequence[tuple[int, float]]):
         self.chosen = tuple((int(number), float(decay)) for number, decay in chosen)
@@ -46,15 +39,9 @@ class CommandTraces:
 
     @classmethod
     def fit(cls, values: np.ndarray, commands: np.ndarray, rows: np.ndarray | None = None) -> "CommandTraces | None":
-        """Chooses the commands, and the decay of each, whose traces are most correlated with the telemetry.
+        """Chooses at most `MOST_COMMANDS` commands of shape `(samples, commands)`, and the decay of each, that are most correlated with telemetry.
 
-        Args:
-            values: Telemetry, shape `(samples,)`.
-            commands: The commands, shape `(samples, commands)`.
-            rows: Samples from which the choice is made; None for all.
-
-        Returns:
-            The traces of at most `MOST_COMMANDS` commands; None if no command was sent.
+        The choice is made from these rows, None for all; the result is None if no command was sent.
         """
         rows = np.arange(len(values)) if rows is None else rows
         centred = np.asarray(values, np.float64)[rows] - np.mean(values[rows], dtype=np.float64)
@@ -73,11 +60,7 @@ class CommandTraces:
         return cls(sorted(chosen)) if chosen else None
 
     def traces(self, commands: np.ndarray) -> np.ndarray:
-        """Computes the coarse columns, float32 of shape `(samples, traces)`, of commands of shape `(samples, commands)`.
-
-        Raises:
-            InputError: If there are fewer commands than in the fit.
-        """
+        """Computes the coarse columns, float32 of shape `(samples, traces)`; raises InputError for fewer commands than in the fit."""
         most = max(number for number, _ in self.chosen)
         if np.ndim(commands) != 2 or np.shape(commands)[1] < most:
             raise InputError(f"Expected at least {most} columns of commands, as in the fit. Received: shape {np.shape(commands)}.")

@@ -57,20 +57,15 @@ def degrade(
     shortest_period_s: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Applies a degraded mode to a signal, which is a function of time.
-
-    The coarse simulator and a true vehicle that is known in closed form are degraded alike by the same scenario and state of `rng`.
+    """Applies a degraded mode to a signal; signals are degraded alike by the same scenario and state of `rng`.
 
     Args:
         signal: The nominal signal, a function from times in seconds to values of the same shape.
-        time_s: Times in seconds, shape `(windows, samples)`.
+        time_s: Times in seconds, shape `(windows, samples)`, as the result.
         scenario: The degraded mode, or None for the nominal signal.
         levels: Lowest and highest nominal level.
         shortest_period_s: Shortest period of the signal in seconds.
         rng: Random number generator for the lags of `friction` and the gaps of `dropout`.
-
-    Returns:
-        float64 array of shape `(windows, samples)`.
     """
     if scenario is None or scenario.severity == 0:
         return signal(time_s)
@@ -80,10 +75,7 @@ def degrade(
 
 @dataclasses.dataclass(frozen=True)
 class ScheduledMode:
-    """A degraded mode during some samples of a series.
-
-    The mode acts on these samples as on a window with the onset 0, and the signal is nominal after the last of them: a mechanism that was
-    stuck continues at the time that it would have reached without the fault.
+    """A degraded mode during some samples of a series, as during a window with the onset 0; the signal is nominal after the last of them.
 
     Raises:
         InputError: If the mode is unknown or a number is out of range.
@@ -114,11 +106,7 @@ def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int]
 
 
 def check_schedule(schedule: Sequence[ScheduledMode], num_samples: int) -> list[ScheduledMode]:
-    """Returns the events of a schedule in the order of time.
-
-    Raises:
-        InputError: If two events overlap or touch, or one extends beyond the series.
-    """
+    """Returns the events in the order of time; raises InputError if two overlap or touch, or one extends beyond the series."""
     ordered = sorted(schedule, key=lambda event: event.begin)
     for before, after in itertools.pairwise(ordered):
         if after.begin <= before.end:

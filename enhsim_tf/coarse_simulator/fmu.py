@@ -13,6 +13,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.interface import check_columns
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.size_limits import short_reason
 
 
 class FmuSimulator:
@@ -49,18 +50,16 @@ class FmuSimulator:
         try:
             description = fmpy.read_model_description(str(path))
         except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions, and those of zip and XML
-            raise InputError(f"Expected an FMU. Received: {self.name}, which cannot be read ({_reason(error)}). Export it again.") from None
+            raise InputError(
+                f"Expected an FMU. Received: {self.name}, which cannot be read ({short_reason(error)[:160]}). Export it again."
+            ) from None
         self._variables = {variable.name: variable.causality for variable in description.modelVariables}
         self._check_names(self.columns, "output", None)
         self._check_names(self.parameters, "parameter", "parameter")
         self._check_names(commands.columns if commands else (), "input", "input")
 
     def run(self, time_s: np.ndarray, scenario: Mapping[str, float] | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates one run, see `interface.CoarseSimulator.run`; a scenario gives other values of parameters by name.
-
-        Raises:
-            InputError: If a parameter does not exist, the commands do not cover the times, or the simulation fails.
-        """
+        """Simulates one run, see `interface.CoarseSimulator.run`; a scenario gives other values of parameters by name."""
         import fmpy
 
         if scenario is not None and not isinstance(scenario, Mapping):
@@ -69,7 +68,10 @@ class FmuSimulator:
             )
         self._check_names(scenario or {}, "parameter", "parameter")
         time_s = np.asarray(time_s, np.float64)
-        step_s, inputs = float(np.mean(np.diff(time_s))), self._inputs(time_s)
+        step_s, inputs = float(np.mean(np.diff(time_s))), None
+        if self.commands is not None:
+            columns = self.commands.run(time_s).astype(np.float64).T
+            inputs = np.rec.fromarrays([time_s, *columns], names=["time", *self.commands.columns])
         try:
             found = fmpy.simulate_fmu(
                 str(self.path),
@@ -82,7 +84,7 @@ class FmuSimulator:
             )
         except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions for whatever goes wrong in the tool's code
             raise InputError(
-                f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {_reason(error)}. Correct the model."
+                f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {short_reason(error)[:160]}. Correct the model."
             ) from None
         places = np.searchsorted(found["time"], time_s + 1e-6 * step_s, "right") - 1  # an FMU may report events in between
         if len(found) < 2 or np.abs(found["time"][places] - time_s).max() > 1e-3 * step_s:
@@ -91,20 +93,8 @@ class FmuSimulator:
             )
         return np.stack([found[name][places] for name in self.columns], axis=1).astype(np.float64)
 
-    def _inputs(self, time_s: np.ndarray) -> np.ndarray | None:
-        """The commands at the times of a run, in the form of FMPy."""
-        if self.commands is None:
-            return None
-        columns = self.commands.run(time_s).astype(np.float64).T
-        return np.rec.fromarrays([time_s, *columns], names=["time", *self.commands.columns])
-
     def _check_names(self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None) -> None:
         for name in names:
             if name not in self._variables or causality not in (None, self._variables[name]):
                 known = [each for each, what in self._variables.items() if causality in (None, what)]
                 raise InputError(f"Expected the name of a variable ({kind}) of {self.name}: {', '.join(known)[:160]}. Received: {name!r}.")
-
-
-def _reason(error: Exception) -> str:
-    """The first line of an exception of FMPy, shortened."""
-    return (str(error).splitlines() or [type(error).__name__])[0][:160]

@@ -1,7 +1,7 @@
 """The interface of coarse simulators: objects that simulate named columns at given times (steps 1 and 2 of the pipeline).
 
-Square waves have this interface, and so have recorded runs of a user's simulator (`recording`). `FunctionSimulator` turns a function into a
-simulator. An object of any class is one if it has the attribute and the method of `CoarseSimulator`.
+Square waves have this interface, and so have recorded runs of a user's simulator (`recording`). An object of any class is a simulator if it
+has the attribute and the method of `CoarseSimulator`.
 """
 
 import inspect
@@ -26,15 +26,12 @@ class CoarseSimulator(Protocol):
     columns: tuple[str, ...]
 
     def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates one run.
+        """Simulates one run, an array of shape `(samples, columns)`.
 
         Args:
             time_s: Times in seconds at a regular interval, ascending, shape `(samples,)`.
             scenario: What differs from nominal operation, in the form that this simulator understands; None is nominal.
             rng: Random number generator for what is random in the scenario.
-
-        Returns:
-            Array of shape `(samples, columns)`.
         """
 
 
@@ -67,11 +64,7 @@ class FunctionSimulator:
         self._takes = {word for word in ("scenario", "rng") if word in parameters or takes_all}
 
     def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Calls the function, see `CoarseSimulator.run`.
-
-        Raises:
-            InputError: If a scenario is given, but the function has no parameter for it.
-        """
+        """Calls the function, see `CoarseSimulator.run`; raises InputError for a scenario if the function has no parameter for it."""
         if scenario is not None and "scenario" not in self._takes:
             raise InputError(
                 f"Expected no scenario for {self.name}, which has no parameter `scenario`. Received: {scenario!r}. Add the parameter, or leave it out."
@@ -81,11 +74,7 @@ class FunctionSimulator:
 
 
 def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
-    """Returns the names of a simulator's outputs as a tuple.
-
-    Raises:
-        InputError: If there is none, one is not text, or one occurs twice.
-    """
+    """Returns the names of a simulator's outputs as a tuple; raises InputError if there is none, one is no text, or one occurs twice."""
     names = (columns,) if isinstance(columns, str) else tuple(columns)
     if not names or any(not isinstance(name, str) or not name for name in names) or len(set(names)) < len(names):
         raise InputError(f"Expected names of columns, each different. Received: {names!r}. Name every output once.")
@@ -93,16 +82,7 @@ def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
 
 
 def simulate(simulator: CoarseSimulator, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-    """Runs a simulator and checks what it returns.
-
-    Args:
-        simulator: The simulator.
-        time_s: Times in seconds, shape `(samples,)`.
-        scenario: What differs from nominal operation, or None.
-        rng: Random number generator. None: one with seed 0.
-
-    Returns:
-        float32 array of shape `(samples, columns)`.
+    """Runs a simulator, see `CoarseSimulator.run`, and checks what it returns; float32 of shape `(samples, columns)`.
 
     Raises:
         InputError: If the object is no simulator, returns another shape or numbers that are not finite, or if the run with a scenario equals

@@ -5,6 +5,7 @@ They are cut to the time that they share. A constant delay between them is estim
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,17 +20,6 @@ _LEAST_CORRELATION = 0.1  # below this correlation at every delay, no delay is e
 _LEAST_SHARE = 0.5  # a delay is considered only if at least this share of the samples remains
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Pair:
-    """A contiguous stretch of telemetry with the coarse run of the same time, delayed, float32 of shape `(samples, columns)`."""
-
-    telemetry: Telemetry
-    coarse: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.telemetry)
-
-
 @dataclasses.dataclass(frozen=True)
 class Delay:
     """A constant delay between the coarse run and the telemetry."""
@@ -40,30 +30,28 @@ class Delay:
     undelayed: float = float("nan")  # the same without a delay
 
 
+class Pair(NamedTuple):
+    """A contiguous stretch of telemetry with the coarse run of the same time, float32 of shape `(samples, columns)`."""
+
+    part: int  # number of the part of the telemetry
+    first: int  # sample of the part with which it begins
+    coarse: np.ndarray
+
+
 def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_s: float = 0.0, least_samples: int = 2) -> list[Pair]:
-    """Pairs telemetry with the recorded run of the same time.
+    """Pairs parts of telemetry, which is so much later, with the run of the same time; returns the pairs in chronological order.
 
-    Args:
-        parts: Contiguous parts of telemetry on one clock.
-        recording: The recorded run.
-        delay_s: How much later the telemetry is than the recorded run, in seconds.
-        least_samples: Shortest pair that is kept, in samples.
-
-    Returns:
-        The pairs in chronological order.
-
-    Raises:
-        InputError: If the two share no time, or no stretch is long enough.
+    Raises InputError if the two share no time, or no stretch of so many samples.
     """
     shift_s = _seconds_between(parts[0], recording) + delay_s
     pairs, longest = [], 0
-    for part in parts:
+    for number, part in enumerate(parts):
         values = recording.at(part.time_s - shift_s)
         for first, stop in runs_of(np.isfinite(values).all(axis=1)):
             longest = max(longest, stop - first)
             if stop - first >= least_samples:
-                pairs.append(Pair(part.part(first, stop), values[first:stop]))
-    if not longest and recording.counts and not (parts[0].start or "1970").startswith("1970"):
+                pairs.append(Pair(number, first, values[first:stop]))
+    if not longest and recording.clock().counts and not parts[0].counts:
         begin = iso_time(nanoseconds(parts[0], 0, 1)[0]).removesuffix("+00:00")
         raise InputError(
             f"Expected a coarse run that overlaps the telemetry in time. Received: dates in {parts[0].name}, times that count from zero in "
@@ -101,18 +89,10 @@ def _seconds_between(telemetry: Telemetry, recording: Recording) -> float:
 
 
 def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples: int) -> Delay:
-    """Estimates a constant delay by cross-correlation.
+    """Estimates a constant delay of at most so many samples by cross-correlation; 0 if no coarse column is correlated with the telemetry.
 
     The coarse column with the largest squared correlation at any delay is used. Among its local maxima that are about as high as the
     highest, the one nearest to no delay is taken, because a periodic signal has a maximum in every period.
-
-    Args:
-        parts: Contiguous parts of telemetry on one clock.
-        recording: The recorded run.
-        max_samples: Largest delay in samples, in both directions: usually the length of a window.
-
-    Returns:
-        The delay, a whole number of samples. It is 0 if no coarse column is correlated with the telemetry.
 
     Raises:
         InputError: If the two share no time, or if the telemetry agrees clearly better at a longer delay.

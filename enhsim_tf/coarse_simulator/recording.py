@@ -43,7 +43,6 @@ class Recording:
         start: Zero of the time axis as ISO 8601 text in UTC, or None if the recording has no times.
         name: Name in messages.
         notes: What was repaired or left out when the recording was read, one line each.
-        counts: Whether the times count from a zero of their own, which `start` then writes as 1970.
     """
 
     parts: tuple[Run, ...]
@@ -52,7 +51,6 @@ class Recording:
     start: str | None = None
     name: str = "the coarse run"
     notes: tuple[str, ...] = ()
-    counts: bool = False
 
     def __post_init__(self):
         check_columns(self.columns)
@@ -62,12 +60,13 @@ class Recording:
     def __len__(self) -> int:
         return sum(map(len, self.parts))
 
-    def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Returns what was recorded, as `at`, and refuses all else, see `interface.CoarseSimulator.run`.
+    @property
+    def values(self) -> np.ndarray:
+        """The values of all parts, one after another, float32 of shape `(samples, columns)`."""
+        return np.concatenate([part.values for part in self.parts])
 
-        Raises:
-            InputError: If a scenario is given, or if a time is not covered.
-        """
+    def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
+        """Returns what was recorded, as `at`; raises InputError if a scenario is given or a time is not covered."""
         if scenario is not None:
             raise InputError(
                 f"Expected no scenario with a recorded run. Received: {str(scenario)[:80]!r}. Record a run of it and give that."
@@ -83,13 +82,9 @@ class Recording:
         return values
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """Returns what was recorded at given times, interpolated linearly between samples, and NaN where nothing was.
+        """Returns what was recorded at times in seconds after the start, float32 of shape `(samples, columns)`.
 
-        Args:
-            time_s: Times in seconds after the start of the recording, shape `(samples,)`.
-
-        Returns:
-            float32 array of shape `(samples, columns)`.
+        Between samples it is interpolated linearly; where nothing was recorded, it is NaN.
         """
         time_s = np.asarray(time_s, np.float64)
         values = np.full((len(time_s), len(self.columns)), np.nan, np.float32)
@@ -109,11 +104,7 @@ class Recording:
         return Telemetry(np.zeros(length, np.float32), self.interval_s, offset_s, self.start, self.name)
 
     def select(self, columns: Sequence[str]) -> "Recording":
-        """Returns the recording with the named columns, in the given order.
-
-        Raises:
-            InputError: If a column is missing.
-        """
+        """Returns the recording with the named columns, in the given order; raises InputError if one is missing."""
         missing = [name for name in columns if name not in self.columns]
         if missing:
             raise InputError(

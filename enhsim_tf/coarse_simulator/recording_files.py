@@ -62,7 +62,8 @@ def read_recording(
         name = printable(Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name)
     if cleaning.same_time is None:
         cleaning = dataclasses.replace(cleaning, same_time="last")
-    notes = [] if columns is None else _compare_columns(source, columns, name, cleaning)
+    table = _table_of(source, cleaning)
+    notes = [] if columns is None or table is None else _compare_columns(list(table), columns, name)
     given = read_source(source, columns, time, cleaning)
     raw, stepped = _at_equal_steps(given, interval_s, cleaning)
     names, cleaned = list(raw), {each: clean(raw[each], cleaning) for each in raw}
@@ -91,25 +92,21 @@ def read_recording(
         )
     if len(shared) > 1:
         notes.append(f"{name}: gaps, at which the run is split into {len(shared)} parts")
-    cells, offset_s = _carried(source, names, given[names[0]], cleaning), 0.0 if has_time else base / 1e9
+    used, offset_s = (*names, given[names[0]].index.name), 0.0 if has_time else base / 1e9
+    others = [each for each in (() if table is None else table) if each not in used and not each.startswith(("column ", "Unnamed: "))]
     parts = []
     for begin, end in shared:
-        rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(begin, end), cleaning) if len(cells.columns) else []
-        carried = {each: cells[each].iloc[rows].reset_index(drop=True) for each in cells}
+        rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(begin, end), cleaning) if others else []
+        carried = {each: table[each].iloc[rows].reset_index(drop=True) for each in others}
         parts.append(Run(values[begin:end], grid_s * begin + offset_s, carried))
-    clock = cleaned[names[0]].report.find("clock")
-    counts = bool(clock is not None and clock.details.get("counts"))
-    shift_ns = 0 if start is None else _start_ns(start, counts, name)
-    zero = iso_time(base + shift_ns) if has_time else None
-    return Recording(tuple(parts), tuple(names), grid_s, zero, name, tuple(map(printable, notes)), counts and start is None)
-
-
-def _start_ns(start: str, counts: bool, name: str) -> int:
-    if not counts:
-        raise InputError(
-            f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
-        )
-    return _begin_ns(Telemetry(np.zeros(1, np.float32), start=start))
+    if start is not None:
+        clock = first.find("clock")
+        if clock is None or not clock.details.get("counts"):
+            raise InputError(
+                f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
+            )
+        base += _begin_ns(Telemetry(np.zeros(1, np.float32), start=start))
+    return Recording(tuple(parts), tuple(names), grid_s, iso_time(base) if has_time else None, name, tuple(map(printable, notes)))
 
 
 def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning) -> tuple[dict[str, pd.Series], str]:
@@ -120,13 +117,13 @@ def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, clea
     times = np.unique(first.index.dropna().as_unit("ns").asi8)
     if len(times) < 3:
         return dict(raw), ""
-    steps = np.diff(times)
-    interval = find_interval(times)
-    if regular_step_fraction(times, interval) > 1 - _FEW_ODD:
+    steps, interval = np.diff(times), find_interval(times)
+    regular = regular_step_fraction(times, interval)
+    if regular > 1 - _FEW_ODD:
         return dict(raw), ""
     if interval_s is not None:
         interval = interval_s * 1e9
-    elif regular_step_fraction(times, interval) < 0.5:
+    elif regular < 0.5:
         interval = float(np.median(steps))
     grid = times[0] + np.round(np.arange(np.floor((times[-1] - times[0]) / interval + 1e-6) + 1) * interval).astype(np.int64)
     return {name: _interpolated(series, grid, cleaning) for name, series in raw.items()}, (
@@ -155,19 +152,16 @@ def _interpolated(series: pd.Series, grid: np.ndarray, cleaning: Cleaning) -> pd
 def _table_of(source: Source, cleaning: Cleaning) -> pd.DataFrame | None:
     """Returns the table behind a source, or None if it is none."""
     if isinstance(source, str | os.PathLike):
-        path = Path(os.fspath(source))
-        if path.suffix.lower() not in _TABLES or not path.is_file():
+        source = Path(os.fspath(source))
+        if source.suffix.lower() not in _TABLES or not source.is_file():
             return None
-        return read_table(path, cleaning).frame
-    return read_table(source if isinstance(source, pd.DataFrame | pd.Series) else list(map(Path, source)), cleaning).frame
+    elif not isinstance(source, pd.DataFrame | pd.Series):
+        source = list(map(Path, source))
+    return read_table(source, cleaning).frame
 
 
-def _compare_columns(source: Source, columns: Sequence[str], name: str, cleaning: Cleaning) -> list[str]:
+def _compare_columns(there: Sequence[str], columns: Sequence[str], name: str) -> list[str]:
     """Refuses a table that lacks a wanted column, and says if the columns are in another order."""
-    table = _table_of(source, cleaning)
-    if table is None:
-        return []
-    there = list(table.columns)
     missing = [column for column in columns if column not in there]
     if missing:
         raise InputError(
@@ -192,15 +186,6 @@ def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float) -> tuple[int, np
 
 def _begin_ns(part: Telemetry) -> int:
     return int(nanoseconds(part, 0, 1)[0])
-
-
-def _carried(source: Source, names: Sequence[str], model: pd.Series, cleaning: Cleaning) -> pd.DataFrame:
-    """Returns the raw columns of a table that are neither inputs nor times."""
-    table = _table_of(source, cleaning)
-    if table is None:
-        return pd.DataFrame()
-    others = [name for name in table.columns if name not in (*names, model.index.name) and not name.startswith(("column ", "Unnamed: "))]
-    return table[others]
 
 
 def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning) -> np.ndarray:

@@ -78,6 +78,8 @@ class SquareWaveSimulator:
     """
 
     columns = ("square waves",)
+    is_constant = False
+    """Whether the simulator has no shape at all, as `ConstantLevel`."""
 
     def __init__(self, waves: Sequence[SquareWave]):
         if not waves:
@@ -90,11 +92,6 @@ class SquareWaveSimulator:
         return sum(min(wave.low, wave.high) for wave in self.waves), sum(max(wave.low, wave.high) for wave in self.waves)
 
     @property
-    def is_constant(self) -> bool:
-        """Whether the simulator has no shape at all, as `ConstantLevel`."""
-        return False
-
-    @property
     def shortest_period_s(self) -> float:
         """The shortest period in seconds."""
         return min(wave.period_s for wave in self.waves)
@@ -104,30 +101,17 @@ class SquareWaveSimulator:
         return sum(wave(time_s) for wave in self.waves)
 
     def simulate(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates windows, float32 of shape `(windows, samples)`.
-
-        Args:
-            time_s: Times in seconds, shape `(windows, samples)`.
-            scenario: A degraded mode, or None for nominal behaviour.
-            rng: Random number generator, used by `friction` and `dropout`. None: a generator with seed 0.
-        """
+        """Simulates windows, float32 of shape `(windows, samples)`; the generator, None: one with seed 0, is for `friction` and `dropout`."""
         rng = np.random.default_rng(0) if rng is None else rng
         return degrade(self, np.asarray(time_s, np.float64), scenario, self.levels, self.shortest_period_s, rng).astype(np.float32)
 
     def run(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates one run, see `interface.CoarseSimulator.run`; returns a float32 array of shape `(samples, 1)`."""
+        """Simulates one run, float32 of shape `(samples, 1)`, see `interface.CoarseSimulator.run`."""
         return self.simulate(np.asarray(time_s, np.float64)[None], scenario, rng)[0][:, None]
 
     @classmethod
     def fit(cls, telemetry: Telemetry) -> "SquareWaveSimulator":
-        """Fits one square wave to telemetry by least squares.
-
-        Args:
-            telemetry: The series, at least two periods long.
-
-        Raises:
-            InputError: If `telemetry` is not a `Telemetry`, or no period is found.
-        """
+        """Fits one square wave to telemetry by least squares; raises InputError if it is no `Telemetry`, or no period is found twice."""
         check_telemetry(telemetry)
         box = fit_box(telemetry.values.astype(np.float64), telemetry.name)
         period_s = telemetry.interval_s / box.frequency
@@ -135,19 +119,13 @@ class SquareWaveSimulator:
         return cls([SquareWave(period_s, float(phase), box.duty, box.low, box.high)])
 
     def get_config(self) -> dict:
-        """The settings as plain JSON types, from which `from_config` restores the simulator."""
+        """The settings as plain JSON types, from which `waves_or_level` restores the simulator."""
         return {"waves": [dataclasses.asdict(wave) for wave in self.waves]}
-
-    @classmethod
-    def from_config(cls, config: dict) -> "SquareWaveSimulator":
-        """Restores a simulator from the output of `get_config`."""
-        return cls([SquareWave(**wave) for wave in config["waves"]])
 
 
 class ConstantLevel(SquareWaveSimulator):
     """A constant level for channels without a shape that repeats, in the form of a square wave whose two levels are equal.
 
-    Everything else that the telemetry does is noise to it, so its enhanced simulator generates noise around levels that occurred.
     The degraded modes of the sensor, `drift` and `dropout`, change it. Those of a mechanism do not, because nothing moves; but in a
     series, telemetry that is stuck no longer follows the levels of the record.
 
@@ -162,17 +140,13 @@ class ConstantLevel(SquareWaveSimulator):
     """
 
     columns = ("constant level",)
+    is_constant = True
 
     def __init__(self, level: float, spread: float, period_s: float = 1.0):
         if not (np.isfinite([level, spread]).all() and spread > 0):
             raise InputError(f"Expected a finite level and a spread above 0. Received: level={level}, spread={spread}.")
         super().__init__([SquareWave(period_s, low=float(level), high=float(level))])
         self.level, self.spread = float(level), float(spread)
-
-    @property
-    def is_constant(self) -> bool:
-        """True: no window of this simulator has a shape."""
-        return True
 
     @property
     def levels(self) -> tuple[float, float]:
@@ -186,7 +160,7 @@ class ConstantLevel(SquareWaveSimulator):
 
 def waves_or_level(config: Mapping[str, Any]) -> SquareWaveSimulator:
     """Restores a simulator from the output of `get_config`: a constant level, or square waves."""
-    return ConstantLevel(**config) if "level" in config else SquareWaveSimulator.from_config(config)
+    return ConstantLevel(**config) if "level" in config else SquareWaveSimulator([SquareWave(**wave) for wave in config["waves"]])
 
 
 def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
@@ -206,11 +180,7 @@ class Box(NamedTuple):
 
 
 def fit_box(values: np.ndarray, name: str = "the series") -> Box:
-    """Fits a square wave to a series of shape `(samples,)` by least squares; `name` is for the message.
-
-    Raises:
-        InputError: If the series has no period that can be found.
-    """
+    """Fits a square wave to a series of shape `(samples,)` by least squares; raises InputError with its name if no period is found."""
     centred, num_samples = values - values.mean(), len(values)
     index = np.arange(num_samples, dtype=np.float64)
 

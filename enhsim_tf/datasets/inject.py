@@ -172,7 +172,7 @@ def inject_joint(telemetry: Recording, options: InjectOptions) -> "pd.DataFrame"
     if len(telemetry.columns) < 2:
         raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
     rng, (shortest, longest) = np.random.default_rng([options.seed, 61]), length_limits(options.length, telemetry.interval_s)
-    values = np.concatenate([part.values for part in telemetry.parts]).astype(np.float32)
+    values = telemetry.values.astype(np.float32)
     edges = np.cumsum([0, *map(len, telemetry.parts)]).tolist()
     bounds, nominal = list(zip(edges[:-1], edges[1:], strict=True)), values.copy()
     noise_sd = np.array([estimate_noise_sd([part.values[:, channel] for part in telemetry.parts]) for channel in range(values.shape[1])])

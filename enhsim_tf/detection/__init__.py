@@ -1,4 +1,1 @@
-"""Anomaly detectors, injected anomalies, thresholds and performance measures (title and abstract of the paper).
-
-This package works on windows of telemetry. It does not depend on simulators.
-"""
+"""Anomaly detectors, injected anomalies, thresholds and performance measures (title and abstract of the paper), on windows of telemetry."""

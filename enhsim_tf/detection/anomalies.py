@@ -1,14 +1,12 @@
 """Synthetic anomalies that are injected into nominal windows and series, to evaluate detectors (title and abstract of the paper).
 
-The severity of an anomaly is stated in units of the standard deviation of the noise. Its position is drawn first, so that the same seed
-gives the same positions for every kind and severity, and detectors are always compared on the same windows.
-
-Each kind is a function of the samples to change, shape `(windows, duration)`, the severity in the unit of the telemetry, the mean of each
-whole window, shape `(windows, 1)`, and a random number generator. It returns the changed samples. `inject` changes each of many windows;
-`inject_anomalies` changes one series, which may consist of parts with gaps between them.
+The severity of an anomaly is stated in units of the standard deviation of the noise. Each kind is a function of the samples to change, shape
+`(windows, duration)`, the severity in the unit of the telemetry, the mean of each whole window, shape `(windows, 1)`, and a random number
+generator; it returns the changed samples. `inject` changes each of many windows, `inject_anomalies` one series in parts.
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -91,11 +89,7 @@ INJECTIONS: dict[str, Callable[[np.ndarray, float, np.ndarray, np.random.Generat
 
 
 def check_kind(kind: str, severity: float) -> None:
-    """Checks a kind of anomaly and its severity.
-
-    Raises:
-        InputError: If the kind is unknown, or the severity is not a number of at least 0. Only `stuck` may be infinite.
-    """
+    """Raises InputError if a kind is unknown, or its severity is not a number of at least 0; only `stuck` may be infinite."""
     if kind not in INJECTIONS:
         raise InputError(f"Expected a kind of anomaly, one of: {', '.join(INJECTIONS)}. Received: {kind!r}. Name one of these.")
     if not severity >= 0 or (severity == np.inf and kind != "stuck"):
@@ -108,7 +102,7 @@ def inject(
     """Injects one anomaly into each window, at a random position.
 
     Args:
-        windows: Nominal windows, shape `(windows, samples)`. They are not modified.
+        windows: Nominal windows, shape `(windows, samples)`.
         kind: Kind of the anomaly, a key of `INJECTIONS`.
         severity: Severity of the anomaly, in units of `noise_sd`.
         duration: Duration of the anomaly, in samples.
@@ -117,9 +111,6 @@ def inject(
 
     Returns:
         The float32 windows, and a boolean array that marks the anomalous samples, both of the shape of `windows`.
-
-    Raises:
-        InputError: If the kind is unknown, if the anomaly is longer than a window, or if the severity is negative.
     """
     check_kind(kind, severity)
     if not 1 <= duration <= windows.shape[1]:
@@ -169,14 +160,8 @@ def estimate_noise_sd(parts: Sequence[np.ndarray]) -> float:
 
     The second difference of white noise with the standard deviation s has the standard deviation s * sqrt(6), which is estimated by the
     median absolute deviation, so that jumps of the signal do not count (Gasser, Sroka and Jennen-Steinmetz 1986, with a robust scale). If
-    more than half of the differences are zero, as in telemetry with few levels, their root mean square is used instead. Noise that is
-    correlated between neighbouring samples is underestimated.
-
-    Args:
-        parts: The series, or the parts between its gaps, each of shape `(samples,)`.
-
-    Returns:
-        The standard deviation in the unit of the series. It is 0 if no part has a second difference other than 0.
+    more than half of the differences are zero, as in telemetry with few levels, their root mean square is used instead; if all are, the
+    result is 0. Noise that is correlated between neighbouring samples is underestimated.
     """
     differences = np.concatenate([np.zeros(0), *(np.diff(np.asarray(part, np.float64), 2) for part in parts if len(part) > 2)])
     if not len(differences):
@@ -199,7 +184,7 @@ def inject_anomalies(
     anomaly would change no sample is drawn again: for example, `stuck` changes nothing where the telemetry is constant.
 
     Args:
-        parts: The nominal series, or the parts between its gaps, each of shape `(samples,)`. They are not modified.
+        parts: The nominal series, or the parts between its gaps, each of shape `(samples,)`.
         given: Anomalies at given places. Samples are counted over all parts.
         drawn: Kind, severity and length of each anomaly whose place is drawn.
         noise_sd: Standard deviation of the noise, in the unit of the series.
@@ -207,14 +192,13 @@ def inject_anomalies(
         rng: Random number generator.
 
     Returns:
-        `(values, mask, anomalies)`: the float32 series of all parts, a boolean array that marks exactly the changed samples, both of
-        shape `(samples,)`, and the anomalies in the order of time, with `begin` and `length` of the samples that have changed.
+        The float32 series of all parts, a boolean array that marks exactly the changed samples, both of shape `(samples,)`, and the
+        anomalies in the order of time, with `begin` and `length` of the samples that have changed.
 
     Raises:
         InputError: If anomalies overlap, lie outside a part, do not fit, or change no sample.
     """
-    edges = np.concatenate([[0], np.cumsum([len(part) for part in parts])]).tolist()
-    bounds = list(zip(edges[:-1], edges[1:], strict=True))
+    bounds = list(itertools.pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
     nominal = np.concatenate([np.asarray(part, np.float32) for part in parts])
     values = nominal.copy()
     taken: list[tuple[int, int]] = []
@@ -265,17 +249,10 @@ def _put_one(
 
 
 def draw_begin(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]], length: int, gap: int, rng: np.random.Generator) -> int:
-    """Draws the first sample of an event uniformly from all samples at which it fits.
+    """Draws the first sample of an event of this length uniformly from all samples at which it fits; raises InputError if there are none.
 
-    Args:
-        bounds: First sample and end of each part of the series. An event lies within one part.
-        taken: First sample and end of each event that is placed already.
-        length: Number of samples of the event.
-        gap: Least number of samples between two events.
-        rng: Random number generator.
-
-    Raises:
-        InputError: If the event fits nowhere.
+    `bounds` are first sample and end of each part of the series, one of which holds the event, `taken` those of the events that are placed
+    already, and `gap` is the least number of samples between two events.
     """
     places = [np.zeros(0, np.int64)]
     for start, stop in bounds:

@@ -9,9 +9,12 @@ from enhsim_tf.detection.detectors import flat
 
 
 class _Autoencoder:
-    """Scores windows by the mean squared reconstruction error of a network that `_build` makes."""
+    """Scores windows by the mean squared reconstruction error of a network that `_build` makes, trained for so many epochs."""
 
-    learning_rate = 0.001
+    default_epochs, learning_rate = 30, 0.001
+
+    def __init__(self, epochs: int | None = None, seed: int = 0):
+        self.epochs, self.seed = epochs or self.default_epochs, seed
 
     def fit(self, windows: np.ndarray) -> "_Autoencoder":
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
@@ -33,15 +36,7 @@ class _Autoencoder:
 
 
 class DenseAutoencoder(_Autoencoder):
-    """Dense autoencoder with hidden layers of 128 units and a bottleneck of 16.
-
-    Args:
-        epochs: Number of training epochs.
-        seed: Seed for the initial weights and for the shuffling of the windows.
-    """
-
-    def __init__(self, epochs: int = 30, seed: int = 0):
-        self.epochs, self.seed = epochs, seed
+    """Dense autoencoder with hidden layers of 128 units and a bottleneck of 16."""
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.training import dense_stack
@@ -56,16 +51,9 @@ class ConvolutionalAutoencoder(_Autoencoder):
     """Convolutional autoencoder, which is local and translation-invariant.
 
     Two convolutions of stride 4 compress every sixteen samples to four numbers, and two transposed convolutions decode them.
-
-    Args:
-        epochs: Number of training epochs.
-        seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
-    learning_rate = 0.003
-
-    def __init__(self, epochs: int = 15, seed: int = 0):
-        self.epochs, self.seed = epochs, seed
+    default_epochs, learning_rate = 15, 0.003
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.backend import keras

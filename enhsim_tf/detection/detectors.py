@@ -7,9 +7,14 @@ units of their standard deviations. `registry` lists all detectors by name.
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.window_features import window_features
 
 _WIDTH = 25  # samples of a moving deviation
+_BOUND = 1.5  # largest factor by which the scale of nominal residuals may grow
+_MEMORY = 64  # past windows whose median size is followed: eight windows that share no sample, at eight windows a length
+_OVERLAP = 8  # the last windows, which share samples with the present one, do not count
+_LEAST_MEMORY = 16  # with fewer past windows, the scale is that of the nominal residuals
 _MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` is fitted
 
 
@@ -45,12 +50,7 @@ class LimitCheck:
 
 
 class PCAResidual:
-    """Residual of a window outside the principal components of the training windows, also known as Sub-PCA.
-
-    Args:
-        num_components: Number of principal components.
-        seed: Seed for the randomised solver.
-    """
+    """Residual of a window outside so many principal components of the training windows, also known as Sub-PCA."""
 
     def __init__(self, num_components: int = 20, seed: int = 0):
         self.num_components, self.seed = num_components, seed
@@ -72,11 +72,7 @@ class PCAResidual:
 
 
 class NearestNeighbours:
-    """Mean Euclidean distance of a window to its nearest training windows.
-
-    Args:
-        num_neighbours: Number of nearest training windows.
-    """
+    """Mean Euclidean distance of a window to so many nearest training windows."""
 
     def __init__(self, num_neighbours: int = 5):
         self.num_neighbours = num_neighbours
@@ -97,11 +93,7 @@ class NearestNeighbours:
 
 
 class IsolationForestOnFeatures:
-    """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`.
-
-    Args:
-        seed: Seed for the trees.
-    """
+    """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`."""
 
     def __init__(self, seed: int = 0):
         self.seed = seed
@@ -138,12 +130,9 @@ class OneClassSVMOnFeatures:
 
 
 class JointMeans:
-    """Mahalanobis distance of the means of all channels in equal parts of a window.
+    """Mahalanobis distance of the means of all channels in so many equal parts of a window.
 
     A small change of one channel against the others is large where they hardly move apart otherwise; shrinkage of the covariance would hide it.
-
-    Args:
-        num_parts: Number of parts of a window.
     """
 
     def __init__(self, num_parts: int = 1):
@@ -180,24 +169,24 @@ class JointSize:
         return np.maximum(*(scale.score(windows) / unit for scale, unit in zip(self._scales, self._units, strict=True)))
 
 
-class LargestStep:
-    """Control: the largest absolute first difference. Anomalies that it finds are trivial to detect (Wu and Keogh 2021)."""
+class _Control:
+    """A trivial detector without anything to learn. Anomalies that it finds are trivial to detect (Wu and Keogh 2021)."""
 
-    def fit(self, windows: np.ndarray) -> "LargestStep":
-        """Does nothing: there is nothing to fit."""
+    def fit(self, windows: np.ndarray) -> "_Control":
+        """Does nothing."""
         return self
+
+
+class LargestStep(_Control):
+    """Control: the largest absolute first difference."""
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest absolute first difference of each window, in the unit of the telemetry."""
         return np.abs(np.diff(windows, axis=1)).reshape(len(windows), windows.shape[1] - 1, -1).max(axis=(1, 2))
 
 
-class MovingDeviation:
+class MovingDeviation(_Control):
     """Control: the largest standard deviation of 25 neighbouring samples."""
-
-    def fit(self, windows: np.ndarray) -> "MovingDeviation":
-        """Does nothing: there is nothing to fit."""
-        return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest moving standard deviation of each window, in the unit of the telemetry."""
@@ -209,13 +198,10 @@ class MovingDeviation:
 
 
 class Innovation:
-    """Size of what a linear prediction from the past of all channels, and from the other channels, does not explain.
+    """Size of what a linear prediction from so many past samples of all channels, less in short windows, does not explain.
 
     The prediction is a vector autoregression, fitted by ridge regression; errors are weighed by the inverse of their covariance. A channel
     that loses its relation to the others, or follows them with another delay, is found although its own values look as before.
-
-    Args:
-        order: Number of past samples of each channel; less in short windows.
     """
 
     def __init__(self, order: int = 48):
@@ -253,3 +239,36 @@ class Innovation:
                 errors -= some[:, lag : lag - order] @ kernels[:, lag]
             scores[first : first + step] = np.mean(np.sum((errors @ self._whiten.astype(np.float32)) ** 2, axis=2), axis=1)
         return scores
+
+
+class ResidualSize:
+    """Size of residuals, telemetry minus what a fitted simulator says that it should be, in units of a scale that follows drift.
+
+    The size of nominal residuals may change as a channel ages. It is therefore divided by a factor that follows the sizes of past windows, from
+    1 to `bound`, so that a residual that is more than `bound` times the threshold is an alarm for as long as it lasts.
+    """
+
+    def __init__(self, bound: float = _BOUND):
+        if not 1 <= bound < np.inf:
+            raise InputError(f"Expected bound >= 1. Received: {bound}.")
+        self.bound, self.typical = float(bound), np.nan
+
+    def fit_sizes(self, sizes: np.ndarray) -> "ResidualSize":
+        """Learns the typical size from those of nominal residuals, shape `(windows,)`."""
+        self.typical = float(np.median(sizes))
+        return self
+
+    def score_sizes(self, sizes: np.ndarray) -> np.ndarray:
+        """Divides sizes of windows, evenly spaced in the order of time, by the median of past sizes in units of the typical one."""
+        import pandas as pd
+
+        factors, first = np.ones(len(sizes)), _OVERLAP + _LEAST_MEMORY
+        if self.typical > 0 and len(sizes) > first:
+            past = pd.Series(sizes[: -_OVERLAP - 1]).rolling(_MEMORY, min_periods=1).median()
+            factors[first:] = past[_LEAST_MEMORY - 1 :] / self.typical
+        return sizes / np.clip(factors, 1.0, self.bound)
+
+
+def root_mean_square(windows: np.ndarray) -> np.ndarray:
+    """Returns the root-mean-square of each window, float64 of shape `(windows,)`."""
+    return np.sqrt(np.mean(np.asarray(windows, np.float64) ** 2, axis=1))

@@ -20,16 +20,7 @@ class Event(NamedTuple):
 
 
 def events_of(flags: np.ndarray, scores: np.ndarray | None = None, gap: int = 0) -> list[Event]:
-    """Joins flagged samples to events.
-
-    Args:
-        flags: Boolean array that marks the flagged samples, shape `(samples,)`.
-        scores: Score of each sample, of the same shape, or None.
-        gap: Runs of flagged samples with at most this many samples between them are one event.
-
-    Returns:
-        The events in the order of time.
-    """
+    """Joins flagged samples, with at most `gap` others between them, to events in the order of time; `scores` give their peaks."""
     joined: list[tuple[int, int]] = []
     for begin, end in runs_of(flags):
         if joined and begin - joined[-1][1] <= gap:
@@ -42,16 +33,8 @@ def events_of(flags: np.ndarray, scores: np.ndarray | None = None, gap: int = 0)
 def confidences(peaks: Sequence[float], nominal_scores: np.ndarray, block: int) -> np.ndarray:
     """Confidence that an event is no false alarm: 1 minus the conformal p-value of its highest score.
 
-    The p-value is the share of blocks of nominal scores whose highest score reaches that of the event, which is itself counted among the
-    blocks. The confidence is therefore below 1, however high the score.
-
-    Args:
-        peaks: Highest score of each event.
-        nominal_scores: Score of each sample of nominal telemetry, shape `(samples,)`.
-        block: Length of a block in samples, for example a window.
-
-    Returns:
-        The confidence of each event, float64 of shape `(events,)`.
+    The p-value is the share of blocks of nominal scores, each of `block` samples, whose highest score reaches that of the event, which is itself
+    counted among the blocks. The confidence is therefore below 1, however high the score.
     """
     highest = np.sort([part.max() for part in np.split(nominal_scores, range(block, len(nominal_scores), block))])
     reached = len(highest) - np.searchsorted(highest, np.asarray(peaks, np.float64), side="left")
@@ -59,14 +42,9 @@ def confidences(peaks: Sequence[float], nominal_scores: np.ndarray, block: int) 
 
 
 def false_alarms_per_day(num_events: int, duration_s: float) -> tuple[float, float, float]:
-    """Expected number of false alarms per day, with its exact Poisson interval of 95 % (Garwood 1936).
+    """Expected number of false alarms per day, and the limits of its exact Poisson interval of 95 % (Garwood 1936).
 
-    Args:
-        num_events: Number of events in nominal telemetry, joined as in operation, so that they are about independent of each other.
-        duration_s: Duration of that telemetry in seconds, above 0.
-
-    Returns:
-        The expected number per day, and the lower and upper limit of its interval.
+    The events in nominal telemetry are joined as in operation, so that they are about independent of each other.
     """
     from scipy.special import gammaincinv  # half of the quantiles of chi-squared; scipy.stats takes a second to import
 

@@ -19,14 +19,10 @@ class Detector(Protocol):
 
 
 class EstimatorDetector:
-    """A detector that wraps an outlier estimator of scikit-learn or PyOD.
+    """A detector that wraps an unfitted outlier estimator of scikit-learn or PyOD.
 
-    Args:
-        estimator: An unfitted estimator with `fit(X)`, and with `score_samples(X)` (scikit-learn: higher is more normal) or
-            `decision_function(X)` (PyOD: higher is more anomalous). `score_samples` takes precedence.
-
-    Raises:
-        InputError: If the estimator lacks these methods.
+    It has `fit(X)`, and `score_samples(X)` (scikit-learn: higher is more normal) or else `decision_function(X)` (PyOD: higher is more
+    anomalous). Raises InputError if it lacks these methods.
     """
 
     def __init__(self, estimator: Any):
@@ -38,16 +34,12 @@ class EstimatorDetector:
         self.estimator = estimator
 
     def fit(self, windows: np.ndarray) -> "EstimatorDetector":
-        """Fits the estimator to windows of shape `(windows, samples)`, one row of its input each."""
+        """Fits the estimator to windows of shape `(windows, samples)`."""
         self.estimator.fit(windows)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the estimator's score of each window, shape `(windows,)`, with the sign that makes higher more anomalous.
-
-        Raises:
-            InputError: If the estimator does not return one score for each window.
-        """
+        """Returns the estimator's score of each window, shape `(windows,)`; higher is more anomalous."""
         if hasattr(self.estimator, "score_samples"):
             scores = -np.asarray(self.estimator.score_samples(windows))
         else:

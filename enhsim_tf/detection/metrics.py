@@ -34,8 +34,7 @@ def threshold(scores: np.ndarray, rate: float) -> float:
 def finite_threshold(scores: np.ndarray, rate: float, num_independent: int | None = None) -> tuple[float, float]:
     """Computes the conformal threshold, or the largest score if there are too few scores for the rate.
 
-    An infinite threshold would silence a detector without a word. With the largest of `n` scores as threshold, the expected
-    false-alarm rate is at most `1 / (n + 1)`, which is returned so that it can be stated instead of the rate asked for.
+    With the largest of `n` scores as threshold, the expected false-alarm rate is at most `1 / (n + 1)`, which is returned.
 
     Args:
         scores: Scores of held-out nominal windows.

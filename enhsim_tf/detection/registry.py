@@ -1,8 +1,7 @@
 """Names and factories of all anomaly detectors (title and abstract of the paper).
 
-To add a detector, write its class in a module of this package and add one line to `BUILT_IN`. A detector of another
-library is added at run time with `register`. This module imports nothing slow, so that the command line can list the
-names.
+To add a detector, write its class in a module of this package and add one line to `BUILT_IN`. This module imports nothing slow, so that the
+command line can list the names.
 """
 
 import importlib
@@ -28,8 +27,8 @@ BUILT_IN = {
 """Maps each detector's name to the path `module:class` of its class, the simplest detector first and the networks last."""
 
 RESIDUAL = "residual"
-"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`residual_size`). It needs a
-simulator, so it is no member of `DETECTORS`."""
+"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`detectors.ResidualSize`). It needs
+a simulator, so it is no member of `DETECTORS`."""
 
 
 def _build(path: str, seed: int) -> "Detector":
@@ -65,8 +64,7 @@ def register(name: str, factory: Callable[[int], Any]) -> None:
 
     Args:
         name: The detector's name in tables, and the value of `ScoreOptions.detector`.
-        factory: Takes a seed and returns, a new one at each call, an unfitted detector, or an estimator of scikit-learn or PyOD; see
-            `interface.EstimatorDetector`.
+        factory: Takes a seed and returns a new, unfitted detector, or an estimator of scikit-learn or PyOD.
 
     Raises:
         InputError: If a detector of this name exists already, or the factory cannot be called.
@@ -79,10 +77,10 @@ def register(name: str, factory: Callable[[int], Any]) -> None:
         raise InputError(f"Expected a name that no detector has yet. Received: name={name!r}. Choose another name.")
     if not callable(factory):
         raise InputError(f"Expected a factory that takes a seed. Received: {type(factory).__name__}. Wrap it, as in `lambda seed: ...`.")
-    DETECTORS[name] = partial(_build_registered, factory)
 
+    def build(seed: int) -> "Detector":
+        from enhsim_tf.detection.interface import as_detector
 
-def _build_registered(factory: Callable[[int], Any], seed: int) -> "Detector":
-    from enhsim_tf.detection.interface import as_detector
+        return as_detector(factory(seed))
 
-    return as_detector(factory(seed))
+    DETECTORS[name] = build

@@ -7,14 +7,16 @@ drawn and whose output layer is a ridge regression. The paper's network is train
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
-from enhsim_tf.enhancer.ridge import fit_ridge
+from enhsim_tf.enhancer.ridge import Ridge, fit_ridge
 
 _PAPER_UNITS = 3_200  # units of each hidden layer of the paper's network
 _PAPER_RATE = 1e-3  # its initial learning rate, which falls to zero along a cosine
@@ -24,9 +26,6 @@ _NEGLIGIBLE = 0.02  # share of the best candidate's squared error: 1 % of its er
 NUM_FOLDS = 3  # folds of interleaved blocks, so that each fold covers the beginning, the middle and the end of the time
 _MOST_BLOCKS = 9
 _WINDOWS_IN_BLOCK = 3  # preferred minimum length of a block, in windows
-
-Layers = Sequence[tuple[np.ndarray, np.ndarray]]
-"""Kernel and bias of each Dense layer."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,6 +52,7 @@ class Choice:
     judged: tuple[Judged, ...]  # the held-out error of each candidate that was tried
     edges: np.ndarray  # of the blocks of time; the blocks of fold 0 were held out
     without_fold: Enhancer  # the chosen candidate as it was judged, fitted without the held-out blocks
+    penalties: tuple[float, ...]  # of ridge regression, one for each channel, chosen without the held-out blocks
 
 
 def choose_enhancer(
@@ -62,7 +62,7 @@ def choose_enhancer(
     wanted: str = BEST,
     seed: int = 0,
     epochs: int = 6,
-    on_candidate: Callable[[str], None] = lambda name: None,
+    progress: Progress = SILENT,
 ) -> Choice:
     """Judges candidates on held-out time and fits the chosen one to all windows.
 
@@ -73,45 +73,39 @@ def choose_enhancer(
         wanted: Name of a candidate to use whatever the errors are, or `best`.
         seed: Random seed of the network and the random features.
         epochs: Passes of the network over the windows.
-        on_candidate: Called with the name of each candidate before it is fitted.
+        progress: Tells the name of each candidate before it is fitted.
 
     Raises:
         InputError: If the name is unknown, shapes do not match, a value is not finite, or there is too little time.
     """
-    inputs, targets, starts = check_windows(inputs, targets, starts)
+    inputs, targets, starts = _checked(inputs, targets, starts)
     if wanted not in (BEST, *CANDIDATES):
         raise InputError(f"Expected an enhancer, one of: {BEST}, {', '.join(CANDIDATES)}. Received: {wanted!r}.")
     window = inputs.shape[1]
     edges = block_edges(int(starts.min()), int(starts.max()) + window, window)
-    learnt, held_out = split_fold(starts, window, edges, fold=0)
-    if len(learnt) < 2 or len(held_out) < 2:
+    rows, held_out = split_fold(starts, window, edges, fold=0)
+    if len(rows) < 2 or len(held_out) < 2:
         raise InputError(
-            f"Expected at least two training windows and two held-out windows. Received: {len(learnt)} and {len(held_out)} of {len(starts)}. "
+            f"Expected at least two training windows and two held-out windows. Received: {len(rows)} and {len(held_out)} of {len(starts)}. "
             "Give more windows, or longer telemetry."
         )
     stretches = np.unique(starts[held_out] // window, return_inverse=True)[1]
     variance = np.var(targets[held_out], axis=(0, 1), dtype=np.float64)
     variance = np.where(variance > 0, variance, 1.0)
-    fitted: dict[str, Enhancer] = {}
-    squared: dict[str, np.ndarray] = {}
-    penalties: list[float] = []  # chosen once, by blocks of the time that is not held out
+    learnt, fitted, squared = _Training(inputs[rows], targets[rows], starts[rows]), {}, {}
     for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
-        on_candidate(name)
-        fitted[name] = fit_enhancer(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs, penalties)
-        penalties.extend(fitted[name].penalties[len(penalties) :])
+        progress.step(f"enhancer {name}")
+        fitted[name] = learnt.fit(name, seed, epochs)
         errors = np.mean((fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
         squared[name] = np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
-    judged = judge(squared)
+    judged, penalties = judge(squared), learnt.ridge.chosen
     chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
-    return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs, penalties), judged, edges, fitted[chosen])
+    enhancer = _Training(inputs, targets, starts, penalties).fit(chosen, seed, epochs)
+    return Choice(enhancer, judged, edges, fitted[chosen], penalties)
 
 
 def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
-    """Compares candidates by their errors on the same held-out stretches of time.
-
-    Args:
-        squared: For each candidate, the mean squared error on each stretch, divided by the targets' variance, shape `(stretches,)`.
-    """
+    """Compares candidates by their mean squared errors, in units of the targets' variance, on the same held-out stretches of time."""
     best = min(squared, key=lambda name: np.mean(squared[name]))
     judged = []
     for name, errors in squared.items():
@@ -143,64 +137,79 @@ def fit_enhancer(
         starts: First sample of each window, shape `(windows,)`.
         seed: Random seed of the network and the random features.
         epochs: Passes of the network over the windows.
-        penalties: Penalty of each channel, as `Enhancer.penalties` of a fit to similar windows; None: chosen by blocks of time.
+        penalties: Penalty of each channel, as `Choice.penalties` of similar windows; None: chosen by blocks of time.
 
     Raises:
         InputError: If the name is unknown, shapes do not match, or a value is not finite.
     """
-    inputs, targets, starts = check_windows(inputs, targets, starts)
-    (_, window, columns), channels = inputs.shape, targets.shape[2]
-    centre, size = inputs.mean(axis=(0, 1), dtype=np.float64), (window, columns, channels)
-    if name in (COARSE, LEVEL_AND_GAIN):
-        return _keeping_the_shape(name, inputs, targets, centre, size)
-    if name not in CANDIDATES:
-        raise InputError(f"Expected an enhancer, one of: {', '.join(CANDIDATES)}. Received: {name!r}.")
-    scale, unit = (_deviations(each) for each in (inputs, targets))
-    middle = targets.mean(axis=(0, 1), dtype=np.float64)
-    rows, wanted = ((inputs - centre) / scale).astype(np.float32), ((targets - middle) / unit).astype(np.float32)
-    flat, outputs = rows.reshape(len(rows), -1), wanted.reshape(len(wanted), -1)
-    column_scale, output_unit = np.tile(scale, window), np.tile(unit, window)
-    linear, factors, layers = np.zeros(outputs.shape[1]), (), ()
-    if name != NETWORK:
-        ridge = fit_ridge(rows, outputs, starts, num_channels=channels, chosen=penalties or None)
-        penalties, maps = ridge.chosen, list(ridge.factors)
-        linear = ridge.target_mean - functools.reduce(np.matmul, maps, ridge.input_mean.ravel())
-        maps[0] = maps[0] / column_scale[:, None]
-        maps[-1] = maps[-1] * output_unit
-        factors = tuple(each.astype(np.float32) for each in maps)
+    return _Training(*_checked(inputs, targets, starts), penalties).fit(name, seed, epochs)
+
+
+class _Training:
+    """Windows that candidates are fitted to; the ridge regression on them is fitted once, for both candidates with one."""
+
+    def __init__(self, inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray, penalties: Sequence[float] | None = None):
+        self.inputs, self.targets, self.starts, self.penalties = inputs, targets, starts, penalties
+        self.centre, self.middle = (each.mean(axis=(0, 1), dtype=np.float64) for each in (inputs, targets))
+        self.scale, self.unit = (_deviations(each) for each in (inputs, targets))
+        self.rows = ((inputs - self.centre) / self.scale).astype(np.float32)
+        self.outputs = ((targets - self.middle) / self.unit).astype(np.float32).reshape(len(targets), -1)
+
+    @functools.cached_property
+    def ridge(self) -> Ridge:
+        """Ridge regression in units of standard deviations."""
+        return fit_ridge(self.rows, self.outputs, self.starts, num_channels=len(self.unit), chosen=self.penalties)
+
+    def fit(self, name: str, seed: int, epochs: int) -> Enhancer:
+        """Fits one candidate."""
+        if name in (COARSE, LEVEL_AND_GAIN):
+            return self._keeping_the_shape(name)
+        if name not in CANDIDATES:
+            raise InputError(f"Expected an enhancer, one of: {', '.join(CANDIDATES)}. Received: {name!r}.")
+        window, flat = self.rows.shape[1], self.rows.reshape(len(self.rows), -1)
+        column_scale, output_unit = np.tile(self.scale, window), np.tile(self.unit, window)
+        linear, factors, layers = np.zeros(self.outputs.shape[1]), (), ()
+        if name == NETWORK:
+            layers = _train(flat, self.outputs, seed, epochs)
+        else:
+            ridge, maps = self.ridge, list(self.ridge.factors)
+            linear = ridge.target_mean - functools.reduce(np.matmul, maps, ridge.input_mean.ravel())
+            maps[0] = maps[0] / column_scale[:, None]
+            maps[-1] = maps[-1] * output_unit
+            factors = tuple(each.astype(np.float32) for each in maps)
         if name == RIDGE_AND_FEATURES:
-            layers = _random_features(flat, outputs - ridge.predict(rows), starts, channels, seed)
-    else:
-        layers = _train(flat, outputs, seed, epochs)
-    if layers:
-        (kernel, bias), (*between, (last, last_bias)) = layers[0], layers[1:]
-        layers = ((kernel / column_scale[:, None], bias), *between, (last * output_unit, last_bias * output_unit))
-        layers = tuple((kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers)
-        if not all(np.isfinite(each).all() for layer in layers for each in layer):
-            raise InputError(
-                "Expected telemetry from which the enhancer can learn. Received: a training that diverged. "
-                "Look for values far from all others, or use --enhancer ridge."
-            )
-    bias = (np.tile(middle, window) + output_unit * linear).astype(np.float32)
-    return Enhancer(name, *size, centre.astype(np.float32), bias, factors, layers, penalties=tuple(penalties or ()))
+            layers = _random_features(flat, self.outputs - ridge.predict(self.rows), self.starts, len(self.unit), seed)
+        if layers:
+            (kernel, bias), (*between, (last, last_bias)) = layers[0], layers[1:]
+            layers = ((kernel / column_scale[:, None], bias), *between, (last * output_unit, last_bias * output_unit))
+            layers = tuple((kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers)
+            if not all(np.isfinite(each).all() for layer in layers for each in layer):
+                raise InputError(
+                    "Expected telemetry from which the enhancer can learn. Received: a training that diverged. "
+                    "Look for values far from all others, or use --enhancer ridge."
+                )
+        return self._enhancer(name, np.tile(self.middle, window) + output_unit * linear, factors, layers)
+
+    def _keeping_the_shape(self, name: str) -> Enhancer:
+        """Fits the two simplest candidates: the most similar coarse column of each channel, unchanged or with a level and a gain."""
+        centred, window = self.inputs - self.centre, self.inputs.shape[1]
+        covariance = np.einsum("wsk,wsc->ck", centred, self.targets - self.middle)
+        power = np.einsum("wsk,wsk->k", centred, centred)
+        safe = np.where(power > 0, power, 1.0)
+        column = np.argmax(covariance**2 / safe, axis=1)
+        if name == COARSE:
+            gain, level = np.ones(len(column)), self.centre[column]
+        else:
+            gain, level = covariance[np.arange(len(column)), column] / safe[column], self.middle
+        return self._enhancer(name, np.tile(level, window), main=(column, gain.astype(np.float32)))
+
+    def _enhancer(self, name: str, bias: np.ndarray, *parts: Any, **others: Any) -> Enhancer:
+        sizes = *self.inputs.shape[1:], self.targets.shape[2]
+        return Enhancer(name, *sizes, self.centre.astype(np.float32), bias.astype(np.float32), *parts, **others)
 
 
-def _keeping_the_shape(name: str, inputs: np.ndarray, targets: np.ndarray, centre: np.ndarray, size: tuple[int, int, int]) -> Enhancer:
-    """Returns the two simplest candidates: the most similar coarse column of each channel, unchanged or with a level and a gain."""
-    centred, middle = inputs - centre, targets.mean(axis=(0, 1), dtype=np.float64)
-    covariance = np.einsum("wsk,wsc->ck", centred, targets - middle)
-    power = np.einsum("wsk,wsk->k", centred, centred)
-    safe = np.where(power > 0, power, 1.0)
-    column = np.argmax(covariance**2 / safe, axis=1)
-    gain = covariance[np.arange(len(column)), column] / safe[column] if name == LEVEL_AND_GAIN else np.ones(len(column))
-    level = middle if name == LEVEL_AND_GAIN else centre[column]
-    return Enhancer(
-        name, *size, centre.astype(np.float32), np.tile(level, size[0]).astype(np.float32), main=(column, gain.astype(np.float32))
-    )
-
-
-def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> Layers:
-    """Trains the paper's network."""
+def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Trains the paper's network; returns kernel and bias of each Dense layer."""
     from enhsim_tf.common.backend import keras
     from enhsim_tf.common.training import dense_stack, fit_windows
 
@@ -211,7 +220,9 @@ def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> Laye
     return [tuple(layer.get_weights()) for layer in network.layers]
 
 
-def _random_features(rows: np.ndarray, left: np.ndarray, starts: np.ndarray, channels: int, seed: int) -> Layers:
+def _random_features(
+    rows: np.ndarray, left: np.ndarray, starts: np.ndarray, channels: int, seed: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Fits ridge regression on random rectified features to what the first regression leaves."""
     rng = np.random.default_rng([seed, 11])
     kernel = rng.standard_normal((rows.shape[1], _NUM_FEATURES)) / np.sqrt(rows.shape[1])
@@ -227,12 +238,8 @@ def _deviations(windows: np.ndarray) -> np.ndarray:
     return np.where(deviation > 1e-6 * np.abs(windows).max(axis=(0, 1), initial=0), deviation, 1.0)
 
 
-def check_windows(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Checks training windows and adds the axis of columns or channels if it is missing.
-
-    Raises:
-        InputError: If the shapes do not match, there is no window, or a value is not finite.
-    """
+def _checked(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Checks training windows and adds the axis of columns or channels if it is missing."""
     inputs, targets, starts = (np.asarray(each) for each in (inputs, targets, starts))
     inputs, targets = (each[:, :, None] if each.ndim == 2 else each for each in (inputs, targets))
     shapes = inputs.ndim == targets.ndim == 3 and inputs.shape[:2] == targets.shape[:2] and starts.shape == inputs.shape[:1]
@@ -247,14 +254,7 @@ def check_windows(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -
 
 
 def block_edges(begin: int, end: int, window: int) -> np.ndarray:
-    """Cuts the samples from `begin` to before `end` into contiguous blocks of about equal length, on which enhancers are judged.
-
-    Returns:
-        The edges in samples, in ascending order; block `b` covers the samples from `edges[b]` to before `edges[b + 1]`.
-
-    Raises:
-        InputError: If a block would be shorter than a window.
-    """
+    """Returns the edges of contiguous blocks of about equal length between two samples; raises InputError if one is shorter than a window."""
     num_blocks = int(np.clip((end - begin) // (_WINDOWS_IN_BLOCK * window), NUM_FOLDS, _MOST_BLOCKS))
     edges = np.linspace(begin, end, num_blocks + 1).round().astype(np.int64)
     if np.diff(edges).min() < window:
@@ -266,18 +266,9 @@ def block_edges(begin: int, end: int, window: int) -> np.ndarray:
 
 
 def split_fold(starts: np.ndarray, window: int, edges: np.ndarray, fold: int) -> tuple[np.ndarray, np.ndarray]:
-    """Splits windows, which may overlap, into training windows and held-out windows that share no sample.
+    """Splits windows, which may overlap, into training windows and held-out windows that share no sample; returns the indices of both.
 
-    Block `b` is held out if `b % NUM_FOLDS == fold`. A window that lies across the edge of a held-out block is in neither set.
-
-    Args:
-        starts: First sample of each window, shape `(windows,)`, in any order.
-        window: Length of a window in samples.
-        edges: Edges of the blocks, as returned by `block_edges`.
-        fold: Number of the fold, from 0.
-
-    Returns:
-        The indices of the training windows, and the indices of the held-out windows.
+    Block `b` is held out if `b % NUM_FOLDS == fold`. A window across the edge of a held-out block is in neither set.
     """
     starts = np.asarray(starts)
     inside, touched = np.zeros((2, len(starts)), bool)

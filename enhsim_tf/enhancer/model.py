@@ -12,41 +12,20 @@ _AVERAGED = 512  # overlapping windows that are enhanced at a time
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Enhancer:
-    """A map from coarse windows to telemetry windows: a linear map, a stack of Dense layers with relu, or the sum of both.
+    """A map from coarse windows to telemetry windows: a linear map, a stack of Dense layers with relu, or the sum of both."""
 
-    Args:
-        name: Name of the candidate, one of `candidates.CANDIDATES`.
-        window: Length of a window in samples.
-        columns: Number of coarse columns.
-        channels: Number of channels.
-        centre: Centre of each coarse column, float32 of shape `(columns,)`, which is subtracted first.
-        bias: Output for coarse windows at their centre, float32 of shape `(window * channels,)`.
-        factors: Matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs; none for no linear map.
-        layers: Kernel and bias of each Dense layer of a network beside the linear map.
-        main: For the candidates that keep the shape of the coarse simulator: for each channel its column, and its gain; otherwise None.
-        penalties: Penalty of each channel in the ridge regression; they are not saved.
-    """
-
-    name: str
-    window: int
+    name: str  # one of `candidates.CANDIDATES`
+    window: int  # samples of a window
     columns: int
     channels: int
-    centre: np.ndarray
-    bias: np.ndarray
-    factors: tuple[np.ndarray, ...] = ()
-    layers: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-    main: tuple[np.ndarray, np.ndarray] | None = None
-    penalties: tuple[float, ...] = ()
+    centre: np.ndarray  # of each coarse column, which is subtracted first, float32 of shape `(columns,)`
+    bias: np.ndarray  # output for coarse windows at their centre, float32 of shape `(window * channels,)`
+    factors: tuple[np.ndarray, ...] = ()  # matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs
+    layers: tuple[tuple[np.ndarray, np.ndarray], ...] = ()  # kernel and bias of each Dense layer of a network beside the linear map
+    main: tuple[np.ndarray, np.ndarray] | None = None  # for candidates that keep the coarse shape: the column of each channel, and its gain
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
-        """Maps coarse windows to enhanced windows.
-
-        Args:
-            inputs: Coarse windows, shape `(windows, samples, columns)`.
-
-        Returns:
-            float32 array of shape `(windows, samples, channels)`.
-        """
+        """Maps coarse windows of shape `(windows, samples, columns)` to enhanced windows, float32 of shape `(windows, samples, channels)`."""
         outputs = np.empty((len(inputs), self.window, self.channels), np.float32)
         for first in range(0, len(inputs), _CHUNK):
             self._map(np.asarray(inputs[first : first + _CHUNK], np.float32) - self.centre, outputs[first : first + _CHUNK])
@@ -90,23 +69,14 @@ class Enhancer:
 
     @classmethod
     def from_arrays(cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> "Enhancer":
-        """Builds an enhancer again.
-
-        Args:
-            settings: As `Enhancer.settings`.
-            arrays: As `Enhancer.arrays`.
-
-        Raises:
-            ValueError, KeyError, IndexError, TypeError: If they are not those of an enhancer.
-        """
+        """Builds an enhancer again from `settings` and `arrays`; raises ValueError, KeyError, IndexError or TypeError if they are of none."""
         window, columns, channels = (int(settings[name]) for name in ("window", "columns", "channels"))
         if not all(np.isfinite(each).all() for each in arrays.values()):
             raise ValueError("an enhancer whose numbers are not finite")
         known = {name: each.astype(np.float32) for name, each in arrays.items()}
         factors = tuple(known[name] for name in ("factor_0", "factor_1") if name in known)
-        layers = tuple(
-            (known[f"kernel_{each}"], known[f"bias_{each}"]) for each in range(sum(name.startswith("kernel_") for name in known))
-        )
+        number = sum(name.startswith("kernel_") for name in known)
+        layers = tuple((known[f"kernel_{each}"], known[f"bias_{each}"]) for each in range(number))
         main = (arrays["column"].astype(np.int64), known["gain"]) if "column" in arrays else None
         if known["centre"].shape != (columns,) or known["bias"].shape != (window * channels,) or (main is not None and main[0].min() < 0):
             raise ValueError("an enhancer whose arrays do not fit together")
@@ -121,16 +91,9 @@ def run_starts(num_samples: int, window: int, hop: int | None = None) -> np.ndar
 
 
 def average_windows(windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int) -> np.ndarray:
-    """Averages overlapping windows into one continuous series, with weights that fall to zero at both ends of a window.
+    """Averages overlapping windows into one series `(num_samples, channels)`, with weights that fall to zero at both ends of a window.
 
-    Args:
-        windows_at: Function from a slice of the window numbers to these windows, shape `(windows, window, channels)`.
-        starts: Start of each window in samples, shape `(windows,)`.
-        window: Length of a window in samples.
-        num_samples: Length of the series.
-
-    Returns:
-        float32 array of shape `(num_samples, channels)`.
+    `windows_at` returns some of the windows, given by a slice of their numbers, and `starts` are their first samples.
     """
     fade = (np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2)[:, None]
     series, total = None, np.zeros((num_samples, 1))

@@ -1,8 +1,4 @@
-"""Out-of-range score: how far a coarse window lies from the enhancer's training windows (an addition to section 2.2 of the paper).
-
-The score is computed from coarse windows only. It needs neither a network nor the true telemetry. It cannot detect an
-error of the coarse simulator itself.
-"""
+"""Out-of-range score: how far a coarse window lies from the enhancer's training windows (an addition to section 2.2 of the paper)."""
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -16,19 +12,16 @@ _WEIGHT = 0.25  # of the distance within the subspace; with 1, the score is abou
 
 
 class OutOfRange:
-    """Distance of a coarse window from the training windows, weighting the residual outside their PCA subspace by 1.
+    """Distance of a coarse window from the training windows.
 
-    A principal component analysis (PCA) of the training windows splits each window into its coordinates in the subspace of the leading
+    A principal component analysis of the training windows splits each window into its coordinates in the subspace of the leading
     components, between which the enhancer interpolates, and the residual, about which it has learned nothing. The score is
 
         sqrt(mean squared residual + 0.25 * mean squared distance to the nearest training window's coordinates) / unit
 
-    where `unit` is the standard deviation of the training windows. Nominal windows have a small positive score. To obtain a limit, apply
-    `enhsim_tf.detection.metrics.threshold` to the scores of held-out nominal windows.
-
-    Of four candidates, this form ranks degraded modes and waves in unseen phases best by the true error of the paper's enhancer: the
-    residual alone is blind to unseen phases, the distance alone gives full weight to shifts that the enhancer follows well, and the
-    Mahalanobis distance decreases when most degraded modes become more severe.
+    where `unit` is the standard deviation of the training windows. Of four candidates, this form ranks degraded modes and waves in unseen
+    phases best by the true error of the paper's enhancer: the residual alone is blind to unseen phases, and the distance alone gives full
+    weight to shifts that the enhancer follows well. `detection.metrics.threshold` of held-out nominal windows is a limit.
 
     Example:
     >>> out_of_range = OutOfRange().fit(coarse_training_windows)
@@ -58,15 +51,11 @@ class OutOfRange:
         return self
 
     def score(self, coarse_windows: np.ndarray) -> np.ndarray:
-        """Scores coarse windows of shape `(windows, samples)`; returns float64 of shape `(windows,)`.
-
-        Windows within the training range score close to 0, and one that is a standard deviation of the training windows away about 1.
+        """Scores coarse windows of shape `(windows, samples)`, float64 of shape `(windows,)`: close to 0 within the training range.
 
         Raises:
-            InputError: If the score is not fitted, the windows have another length, or a value is not finite.
+            InputError: If the windows have another length than in the fit, or a value is not finite.
         """
-        if not hasattr(self, "_mean"):
-            raise InputError("Expected a fitted score. Received: OutOfRange before fit. Call fit with the training windows.")
         windows = _checked(coarse_windows, len(self._mean))
         with threadpool_limits(1):
             chunks = [self._score(windows[begin : begin + _CHUNK]) for begin in range(0, len(windows), _CHUNK)]

@@ -18,20 +18,12 @@ _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest
 
 @dataclasses.dataclass(frozen=True)
 class Ridge:
-    """A fitted ridge regression from input windows to target windows.
+    """A fitted ridge regression from input windows to target windows; all arrays are float64."""
 
-    Args:
-        factors: Matrices, float64, whose product is the change of each output for a change of each input, shape
-            `(samples * columns, outputs)`: one, or two for few windows with many columns, which hold fewer numbers.
-        input_mean: Mean training window, float64 of shape `(samples, columns)`.
-        target_mean: Mean training target, float64 of shape `(outputs,)`.
-        chosen: The penalty of each channel.
-    """
-
-    factors: tuple[np.ndarray, ...]
-    input_mean: np.ndarray
-    target_mean: np.ndarray
-    chosen: tuple[float, ...]
+    factors: tuple[np.ndarray, ...]  # their product is of shape `(samples * columns, outputs)`: one, or two that hold fewer numbers
+    input_mean: np.ndarray  # mean training window, shape `(samples, columns)`
+    target_mean: np.ndarray  # mean training target, shape `(outputs,)`
+    chosen: tuple[float, ...]  # the penalty of each channel
 
     @property
     def penalty(self) -> float:
@@ -39,24 +31,14 @@ class Ridge:
         return min(self.chosen)
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
-        """Predicts the targets of input windows.
-
-        Args:
-            inputs: Windows of shape `(windows, samples)` or `(windows, samples, columns)`, as in training.
-
-        Returns:
-            float32 array of shape `(windows, outputs)`.
-
-        Raises:
-            InputError: If the shape differs from that of the training windows.
-        """
+        """Predicts the targets of windows as in training, float32 of shape `(windows, outputs)`; raises InputError for another shape."""
         windows = _with_columns(inputs)
         if windows.shape[1:] != self.input_mean.shape:
             raise InputError(
                 f"Expected windows of (samples, columns) {self.input_mean.shape}, as in training. Received: {windows.shape[1:]}. "
                 "Cut windows of the same length with the same columns."
             )
-        mapped = _flat(windows - self.input_mean)
+        mapped = (windows - self.input_mean).reshape(len(windows), -1)
         for factor in self.factors:
             mapped = mapped @ factor
         return (self.target_mean + mapped).astype(np.float32)
@@ -131,7 +113,9 @@ class _Solution:
 
     def __init__(self, windows: np.ndarray, targets: np.ndarray):
         self.input_mean, self.target_mean = windows.mean(axis=0), targets.mean(axis=0)
-        self.scale = np.tile(_column_deviations(windows), windows.shape[1])
+        deviation = np.sqrt(np.mean((windows - self.input_mean) ** 2, axis=(0, 1)))  # of each column about its mean window
+        is_constant = deviation <= _ROUNDING * np.abs(windows).max(axis=(0, 1))
+        self.scale = np.tile(np.where(is_constant, 1.0, deviation), windows.shape[1])
         design, outputs = self._standardised(windows), targets - self.target_mean
         if len(design) >= design.shape[1]:
             self.values, self.basis = np.linalg.eigh(design.T @ design)
@@ -141,7 +125,7 @@ class _Solution:
             self.basis, self.moments = design.T @ vectors, vectors.T @ outputs
 
     def _standardised(self, windows: np.ndarray) -> np.ndarray:
-        return _flat(windows - self.input_mean) / self.scale
+        return (windows - self.input_mean).reshape(len(windows), -1) / self.scale
 
     def project(self, windows: np.ndarray) -> np.ndarray:
         return self._standardised(windows) @ self.basis
@@ -150,19 +134,9 @@ class _Solution:
         return self.moments / (np.maximum(self.values, 0.0)[:, None] + penalty)
 
 
-def _column_deviations(windows: np.ndarray) -> np.ndarray:
-    """Standard deviation of each column about its mean window, 1 for a constant column, shape `(columns,)`."""
-    deviation = np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=(0, 1)))
-    return np.where(deviation > _ROUNDING * np.abs(windows).max(axis=(0, 1)), deviation, 1.0)
-
-
 def _with_columns(windows: np.ndarray) -> np.ndarray:
     windows = np.asarray(windows, np.float64)
     return windows[:, :, None] if windows.ndim == 2 else windows
-
-
-def _flat(windows: np.ndarray) -> np.ndarray:
-    return windows.reshape(len(windows), -1)
 
 
 def _checked(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

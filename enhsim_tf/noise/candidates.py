@@ -24,16 +24,10 @@ class NoiseModel(Protocol):
 
 
 def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.ndarray | None = None) -> NoiseModel:
-    """Fits a noise model.
+    """Fits a noise model, one of `names.CANDIDATES`, to windows of noise; raises InputError if it cannot be fitted to this noise.
 
-    Args:
-        name: One of `names.CANDIDATES`.
-        noise: Windows of noise of shape `(windows, samples, channels)`, or without the last axis, in the unit of the telemetry.
-        signal: The enhanced signal below them, of the same shape.
-        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
-
-    Raises:
-        InputError: If there is no model of that name, or if it cannot be fitted to this noise.
+    Noise and the enhanced signal below it have the shape `(windows, samples, channels)`, or no last axis. `starts` are the first samples of the
+    windows; None: no two overlap.
     """
     window = noise.shape[1]
     match name:
@@ -52,11 +46,7 @@ def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.n
 
 
 def state_of(model: NoiseModel) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Returns what is saved of a noise model of all channels: its settings in plain JSON types, and its arrays by name.
-
-    Raises:
-        InputError: If it is a model of another class, which is not saved.
-    """
+    """Returns what is saved of a noise model of all channels: its settings in plain JSON types, and its arrays by name."""
     match model:
         case GaussianNoise():
             return {"kind": "gaussian" if model.root.any() else "none", "window": model.window}, {"root": model.root}
@@ -72,11 +62,7 @@ def state_of(model: NoiseModel) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 def model_from(settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> NoiseModel:
-    """Makes a noise model again from what `state_of` returned.
-
-    Raises:
-        ValueError: If they do not describe a noise model, or a number is not finite.
-    """
+    """Makes a noise model again from what `state_of` returned; raises ValueError if that is none, or a number is not finite."""
     if not all(np.isfinite(np.asarray(each, np.float64)).all() for each in arrays.values()):
         raise ValueError("noise that is not finite")
     match settings["kind"]:

@@ -22,12 +22,7 @@ class _Stationary:
 
 
 class GaussianNoise(_Stationary):
-    """White Gaussian noise with the standard deviations of the real noise and its correlation between channels.
-
-    Args:
-        root: A root of the channels' covariance `root @ root.T`, shape `(channels, channels)`; or the deviation of a single channel.
-        window: Number of samples in a window.
-    """
+    """White Gaussian noise with the covariance `root @ root.T` between channels; of a single channel the root may be its deviation."""
 
     def __init__(self, root: np.ndarray | float, window: int):
         self.root, self.window = np.asarray(root, np.float64), int(window)
@@ -53,12 +48,7 @@ def _root(covariance: np.ndarray) -> np.ndarray:
 
 
 class JointAutoregression(_Stationary):
-    """Gaussian autoregressive noise of several channels: one `GaussianAutoregression` each, with correlated innovations.
-
-    Args:
-        channels: The autoregression of each channel.
-        correlation: Correlation of their innovations, shape `(channels, channels)`.
-    """
+    """Gaussian autoregressive noise of several channels: one `GaussianAutoregression` each, with innovations of this correlation."""
 
     def __init__(self, channels: "Sequence[GaussianAutoregression]", correlation: np.ndarray):
         self.channels, self.correlation = tuple(channels), np.asarray(correlation, np.float64)
@@ -97,14 +87,9 @@ class GaussianAutoregression(_Stationary):
 
     @classmethod
     def fit(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianAutoregression":
-        """Fits by Burg's method (1975), which always gives a stationary process; the Akaike information criterion chooses the order.
+        """Fits to windows of shape `(windows, samples)` by Burg's method (1975), which always gives a stationary process.
 
-        Args:
-            windows: Noise windows of shape `(windows, samples)`.
-            max_order: The largest order that may be chosen.
-
-        Raises:
-            InputError: If the windows are not longer than `max_order`, or if they are constant.
+        The Akaike information criterion chooses the order. Raises InputError if the windows are not longer than `max_order`, or constant.
         """
         if windows.shape[1] <= max_order:
             raise InputError(f"Expected windows of more samples than max_order={max_order}. Received: {windows.shape[1]} samples.")

@@ -28,9 +28,6 @@ class WindowBootstrap:
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
         starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
-
-    Raises:
-        InputError: If there is no window, a value is not finite, or `starts` are not a whole number for each window.
     """
 
     def __init__(self, windows: np.ndarray, starts: np.ndarray | None = None):
@@ -65,12 +62,9 @@ class MatchedWindowBootstrap:
     In a longer series, the mean of the neighbours is cross-faded with weights that add up to one, and the rest as by `WindowBootstrap`.
 
     Args:
-        windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
+        windows: As for `WindowBootstrap`.
         signals: Means of the signal below each window over segments, shape `(windows, segments)`; see `fit`.
-        starts: First sample of each window, shape `(windows,)`; see `WindowBootstrap`.
-
-    Raises:
-        InputError: If there is no window, a value is not finite, the numbers of windows differ, or `starts` are not whole numbers.
+        starts: As for `WindowBootstrap`.
     """
 
     def __init__(self, windows: np.ndarray, signals: np.ndarray, starts: np.ndarray | None = None):
@@ -85,11 +79,7 @@ class MatchedWindowBootstrap:
         return cls(windows, _segment_means(signal, np.shape(windows)), starts)
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows, float32 of the shape of `signal`, the signal that the noise is added to, in the unit of the fit.
-
-        Raises:
-            InputError: If the signal is not finite, or has another shape than `(number, samples, channels)`.
-        """
+        """Draws windows, float32 of the shape of `signal`, the signal that the noise is added to, in the unit of the fit."""
         return self.windows[self._draw(self._nearest(signal, number), rng)]
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:

@@ -1,6 +1,7 @@
 """How a window of telemetry finds its coarse window: by the clock of a recorded run, or by phase, offset and gain of fitted square waves."""
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -12,7 +13,8 @@ from enhsim_tf.coarse_simulator.pairing import pair_with_recording
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, waves_or_level
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.simulator.joint import cut, telemetry_of
+from enhsim_tf.simulator.joint import cut, long_enough, telemetry_of, windows_of
+from enhsim_tf.telemetry.windows import num_window_starts
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
 START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
@@ -29,15 +31,11 @@ class Aligned(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """Coarse windows for generated telemetry, float32 of shape `(windows, samples, columns)`, and the same without a degraded mode.
+    """Coarse windows for generated telemetry."""
 
-    `held` is for each sample the one whose value it has: where a mechanism is stuck, the first of these samples, otherwise itself; None if nothing
-    is stuck.
-    """
-
-    coarse: np.ndarray
-    nominal: np.ndarray
-    held: np.ndarray | None = None
+    coarse: np.ndarray  # float32 of shape `(windows, samples, columns)`
+    nominal: np.ndarray  # the same without a degraded mode
+    held: np.ndarray | None = None  # of each sample the one whose value it has: the first of a mechanism that is stuck; None if nothing is
 
 
 class Waves:
@@ -82,16 +80,17 @@ class Waves:
             if simulator.is_constant:  # there is no shape to which a phase or a gain could be fitted
                 shift[:, channel], gain[:, channel] = target.mean(axis=1, dtype=np.float64), simulator.spread
                 continue
-            phases, best = self.phases(channel), self.best_phases(targets, channel)
-            waveform = phases if self.waveforms[channel] is None else self.waveforms[channel]
-            coarse[:, :, channel] = phases[best]
-            shift[:, channel], gain[:, channel] = least_squares(waveform[best], target)
+            best = self.best_phases(targets, channel)
+            coarse[:, :, channel] = self.phases(channel)[best]
+            shift[:, channel], gain[:, channel] = least_squares(self._waveform(channel)[best], target)
         return Aligned(coarse, shift, gain)
+
+    def _waveform(self, channel: int) -> np.ndarray:
+        return self.phases(channel) if self.waveforms[channel] is None else self.waveforms[channel]
 
     def best_phases(self, targets: np.ndarray, channel: int) -> np.ndarray:
         """Returns the number of the phase at which the waveform of a channel is most correlated with each window, shape `(windows,)`."""
-        waveform = self.phases(channel) if self.waveforms[channel] is None else self.waveforms[channel]
-        target = targets[:, :, channel]
+        waveform, target = self._waveform(channel), targets[:, :, channel]
         centred = waveform - waveform.mean(axis=1, keepdims=True, dtype=np.float64)
         length = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
         # the waveforms are centred, so the level of the telemetry has no effect
@@ -105,12 +104,9 @@ class Waves:
         """
         simulators = list(self.simulators)
         moving = [number for number, each in enumerate(simulators) if not each.is_constant]
-        for place, first in enumerate(moving):
-            wave = simulators[first].waves[0]
-            for other in moving[place + 1 :]:
-                old = simulators[other].waves[0]
-                if not 0 < abs(old.period_s / wave.period_s - 1) < _SAME_PERIOD:
-                    continue
+        for first, other in itertools.combinations(moving, 2):
+            wave, old = simulators[first].waves[0], simulators[other].waves[0]
+            if 0 < abs(old.period_s / wave.period_s - 1) < _SAME_PERIOD:
                 moved = (self.best_phases(targets, other) - self.best_phases(targets, first)) / _NUM_PHASES + old.phase - wave.phase
                 apart = np.angle(np.mean(np.exp(2j * np.pi * moved))) / (2 * np.pi)
                 phase = float(np.mod(wave.phase + apart, 1.0))
@@ -234,43 +230,35 @@ class Runs:
         return self.nominal.columns
 
     def usable(self, run: Recording) -> Recording:
-        """Returns the parts of a recording that can be enhanced, with the columns of the fit; further columns are ignored.
-
-        Raises:
-            InputError: If a column is missing, the interval differs, or every part is shorter than a window.
-        """
+        """Returns the parts of a recording that can be enhanced, with the columns of the fit; raises InputError if there are none."""
         run, interval_s = run.select(self.columns), self.nominal.interval_s
         if abs(run.interval_s / interval_s - 1) > SAME_RATE:
             raise InputError(
                 f"Expected a coarse run with a sample every {interval_s:g} s, as in the fit. Received: every {run.interval_s:g} s in {run.name}. "
                 "Read it with read_recording(..., interval_s=model.interval_s)."
             )
-        parts = tuple(part for part in run.parts if len(part) >= self.window)
-        if not parts:
+        usable = long_enough(run, self.window)
+        if usable is None:
             raise InputError(
                 f"Expected a coarse run of at least one window of {self.window} samples without a gap. "
                 f"Received: {max(map(len, run.parts))} samples in {run.name}. Record a longer run."
             )
-        return dataclasses.replace(run, parts=parts)
+        return usable
 
     def pair(self, telemetry: Recording, run: Recording) -> tuple[Recording, Recording]:
         """Cuts telemetry and a run to the stretches of at least a window that both cover; raises InputError if there are none."""
         return pair_recordings(telemetry, self.usable(run), self.delay_s, self.window)
 
     def draw(self, starts: np.ndarray, scenarios: Sequence[Any], rng: np.random.Generator) -> Drawn:
-        """Cuts coarse windows out of the nominal run; `starts` count its possible windows and begin again after the last.
-
-        Raises InputError for a scenario, because a recorded run is nominal.
-        """
+        """Cuts coarse windows out of the nominal run, whose possible starts are counted again and again; raises InputError for a scenario."""
         for scenario in scenarios:
             if scenario is not None:
                 raise InputError(
                     f"Expected a recorded run of the scenario for a model of recorded runs. Received: {str(scenario)[:80]}. "
                     "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
                 )
-        parts = [part.values for part in self.usable(self.nominal).parts]
-        number = sum(len(each) - self.window + 1 for each in parts)
-        windows = cut(parts, np.asarray(starts) % number, self.window)
+        run = self.usable(self.nominal)
+        windows = windows_of(run, np.asarray(starts) % num_window_starts(run.parts, self.window), self.window)
         return Drawn(windows, windows)
 
     @property
@@ -320,11 +308,10 @@ def pair_recordings(telemetry: Recording, run: Recording, delay_s: float, least_
     """Cuts telemetry and a coarse run to the same parts, which both cover, on the clock of the telemetry; see `pair_with_recording`."""
     values, coarse, interval_s = [], [], telemetry.interval_s
     for pair in pair_with_recording(telemetry_of(telemetry), run, delay_s, least_samples):
-        low = pair.telemetry.offset_s
-        part = next(each for each in telemetry.parts if -1e-6 <= low - each.offset_s <= interval_s * (len(each) - 0.5))
-        first = round((low - part.offset_s) / interval_s)
-        values.append(Run(part.values[first : first + len(pair)], low))
-        coarse.append(Run(pair.coarse, low))
+        part = telemetry.parts[pair.part]
+        begin_s = part.offset_s + interval_s * pair.first
+        values.append(Run(part.values[pair.first : pair.first + len(pair.coarse)], begin_s))
+        coarse.append(Run(pair.coarse, begin_s))
     joined = dataclasses.replace(telemetry, parts=tuple(values))
     return joined, dataclasses.replace(run, parts=tuple(coarse), interval_s=interval_s, start=telemetry.start)
 

@@ -1,12 +1,10 @@
 """Where a degraded mode changes generated telemetry: the samples that it changes, and the mask that marks exactly these.
 
-The enhancer maps whole windows, so a change of a few coarse samples changes every sample of its output, also before the change
-began. Generated telemetry therefore takes the enhanced degraded run only from the first to the last coarse sample that differs
-from the nominal run of the same seed. Over a sixteenth of a window on both sides it fades into the enhanced nominal run, and
-beyond that it equals the nominal run to the bit. Where a mechanism is stuck, the telemetry without noise keeps the value that it had
-when the mechanism stopped: the enhancer has never seen a mechanism that stands still, and its output moves on. Differences up to a
-tenth of the standard deviation of the noise are removed. A sample is therefore either marked, and differs by more than that
-tolerance, or it is the sample of the nominal run.
+The enhancer maps whole windows, so a change of a few coarse samples changes every sample of its output, also before the change began.
+Generated telemetry therefore takes the enhanced degraded run only from the first to the last coarse sample that differs from the nominal run
+of the same seed, and fades into the nominal run over a sixteenth of a window on both sides. Where a mechanism is stuck, the telemetry without
+noise keeps its value: the enhancer has never seen a mechanism that stands still. Differences up to a tenth of the standard deviation of the
+noise are removed, so a sample is either marked, and differs by more, or it is that of the nominal run to the bit.
 """
 
 from collections.abc import Iterable
@@ -28,7 +26,7 @@ def fade_length(window: int) -> int:
 def put_changes(
     nominal: np.ndarray, degraded: np.ndarray, drawn: Drawn, ranges: Iterable[tuple[int, int]], fade: int, tolerance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Puts the changes of degraded runs into nominal ones.
+    """Puts the changes of degraded runs into nominal ones; returns the float32 runs, and a mask of the samples that differ.
 
     Args:
         nominal: Enhanced nominal runs, float32 of shape `(runs, samples, channels)`.
@@ -37,9 +35,6 @@ def put_changes(
         ranges: First sample and end of each degraded mode.
         fade: Number of samples on each side over which the runs are cross-faded.
         tolerance: Largest difference from the nominal run that does not count as a change, shape `(channels,)`.
-
-    Returns:
-        The float32 runs, and a boolean array that marks the samples that differ from the nominal run; all other samples equal it.
     """
     runs, mask = nominal.copy(), np.zeros(nominal.shape, bool)
     for begin, end in ranges:

@@ -1,7 +1,7 @@
 """Chooses the coarse simulator of a channel: square waves, the commands that its file holds, or a constant level.
 
 Square waves need a period that occurs at least twice. Commands need no period. A constant level is what remains: it knows nothing of
-what comes when, and says so. Only telemetry that is constant or very short is refused.
+what comes when, and says so.
 """
 
 from collections.abc import Sequence
@@ -47,12 +47,10 @@ def choose_coarse(
         refused: Why square waves are not to be used; None if they may be.
 
     Raises:
-        InputError: If the telemetry is constant, or shorter than eight windows.
+        InputError: If the telemetry is shorter than eight windows.
     """
     name, longest = parts[0].name, max(parts, key=len)
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
-    if np.ptp(values) == 0:
-        raise InputError(f"Expected telemetry that varies. Received: {name}, which is constant. Nothing can be learnt from it.")
     if len(values) < LEAST_SAMPLES:
         raise InputError(
             f"Expected at least {LEAST_SAMPLES} samples, {LEAST_LEARNT} windows of {FEWEST_SAMPLES}. Received: {len(values)} of {name}. "
@@ -71,10 +69,9 @@ def choose_coarse(
     wanted = window or default_window(len(values))
     fitting = _fitting_window(parts, wanted, wanted if window else FEWEST_SAMPLES)
     if not fitting:
-        what = f"at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from"
         raise InputError(
-            f"Expected {what}. Received: {len(values)} samples of {name}, the longest part {len(longest)}. "
-            "Give more telemetry or a smaller window."
+            f"Expected at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from. Received: {len(values)} samples of "
+            f"{name}, the longest part {len(longest)}. Give more telemetry or a smaller window."
         )
     about_commands = "its file has no commands"
     if traces is not None and by_commands:
@@ -120,10 +117,7 @@ def _fitting_window(parts: Sequence[Telemetry], most: int, least: int) -> int | 
 
 
 def _explained_by_commands(parts: Sequence[Telemetry], commands: np.ndarray) -> tuple[CommandTraces | None, float]:
-    """Returns the traces of the commands, and the share of the variance that they explain on held-out blocks of time.
-
-    The share is 0 unless it is larger than with the same commands at other times: slow traces of unrelated commands may follow slow telemetry.
-    """
+    """Returns the traces of the commands, and the share of the variance that they explain on held-out blocks of time; 0 if by chance."""
     rows = np.concatenate([round(part.offset_s) + np.arange(len(part)) for part in parts])
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
     if len(commands) <= rows.max():
@@ -134,6 +128,7 @@ def _explained_by_commands(parts: Sequence[Telemetry], commands: np.ndarray) -> 
         return None, 0.0
     explained = _held_out_share(values, commands)
     shifts = np.linspace(0, len(values), _NUM_SHIFTS + 2)[1:-1].astype(int)
+    # slow traces of unrelated commands may follow slow telemetry
     by_chance = (_held_out_share(values, np.roll(commands, shift, axis=0)) for shift in shifts)
     is_real = explained >= _LEAST_EXPLAINED and all(explained > share for share in by_chance)
     return traces, explained if is_real else 0.0

@@ -37,21 +37,13 @@ _DELAY = 0.25  # of a window, by which one channel is shifted against the others
 
 @dataclasses.dataclass(frozen=True)
 class JudgedDetector:
-    """A detector on held-out nominal time.
-
-    Args:
-        name: Its name.
-        false_alarms: Share of held-out nominal samples that it flags.
-        allowed: Largest share with which it keeps its promise.
-        recall: Mean recall over all kinds and severities of injected anomalies, those of relations apart.
-        by_kind: Recall by kind, mean over severities.
-    """
+    """A detector on held-out nominal time."""
 
     name: str
-    false_alarms: float
-    allowed: float
-    recall: float
-    by_kind: dict[str, float]
+    false_alarms: float  # share of held-out nominal samples that it flags
+    allowed: float  # largest share with which it keeps its promise
+    recall: float  # mean over all kinds and severities of injected anomalies, those of relations apart
+    by_kind: dict[str, float]  # mean over severities
 
     @property
     def keeps(self) -> bool:

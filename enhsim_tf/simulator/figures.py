@@ -1,11 +1,10 @@
 """The figures of a report and of scores: series of up to three channels, and beside or below them how the detectors do."""
 
-from typing import TYPE_CHECKING
-
 import matplotlib.dates
 import matplotlib.figure
 import matplotlib.style
 import numpy as np
+import pandas as pd
 from matplotlib import font_manager
 
 from enhsim_tf.common.errors import printable
@@ -27,11 +26,7 @@ from enhsim_tf.common.plot_style import (
 from enhsim_tf.simulator.detector_choice import RATE
 from enhsim_tf.simulator.report import Report
 from enhsim_tf.simulator.scoring import events_table, told_times
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _MOST_CHANNELS = 3
 _MOST_POINTS = 4_000  # of a curve; beyond, the smallest and the largest value of each stretch are drawn
@@ -85,20 +80,14 @@ def report_figure(report: Report) -> matplotlib.figure.Figure:
     return figure
 
 
-def score_figure(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: str) -> matplotlib.figure.Figure:
-    """Draws scored telemetry: series, enhanced run if there is one, scores and events.
-
-    Args:
-        frame: Scores, as returned by `scoring.score`.
-        simulator: The simulator.
-        name: Name of the source.
-    """
+def score_figure(frame: pd.DataFrame, simulator: EnhancedSimulator, name: str) -> matplotlib.figure.Figure:
+    """Draws the scores that `scoring.score` returns: series, enhanced run if there is one, scores and events; `name` is that of the source."""
     single = len(simulator.channels) == 1
     channels = ["value"] if single else list(simulator.channels[:_MOST_CHANNELS])
     number = len(events_table(frame))
     title = f"{drawable(name, 30)}: {number:,} {'event' if number == 1 else 'events'}, {frame['flag'].mean():.1%} of samples flagged"
     subtitle = f"Detector: {frame.attrs['detector']}. Shaded: events. Dashed: threshold."
-    rows, times = len(channels) + 1, told_times(frame.index)
+    rows, times = len(channels) + 1, told_times(frame)
     has_time = hasattr(times, "tz")
     times = times.tz_convert(None) if has_time and times.tz is not None else times
     with matplotlib.style.context(STYLE):

@@ -12,52 +12,37 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, replace_folder, write_json
 from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
+from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.options import FitOptions
-from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
-
-if TYPE_CHECKING:
-    import numpy as np
-    import pandas as pd
-
-    from enhsim_tf.coarse_simulator.recording import Recording
-    from enhsim_tf.telemetry.cleaning.clean import Cleaned
+from enhsim_tf.telemetry.series import check_values
 
 THREADS = 1  # of a worker
 
 
 @dataclasses.dataclass(frozen=True)
-class CoarseRun:
-    """Where the recorded run of a coarse simulator is; see `recording_files.read_recording` for its columns, time and start."""
-
-    source: str
-    columns: Sequence[str] | None = None
-    time: str | None = None
-    start: str | None = None
-
-
-@dataclasses.dataclass(frozen=True)
 class Job:
-    """Channels to fit: together, if there are several. The fields are arguments of `fit_channels`.
+    """Channels to fit, together if there are several. The fields are arguments of `fit_channels`; `out` is absolute."""
 
-    `out` is an absolute path, because a worker may have another working directory.
-    """
-
-    series: "Mapping[str, pd.Series]"
+    series: Mapping[str, pd.Series]
     out: Path
     options: FitOptions
     cleaning: Cleaning
     speaks: bool = False
-    run: CoarseRun | None = None
-    commands: "np.ndarray | None" = None
+    read_run: Callable[..., Recording] | None = None
+    commands: np.ndarray | None = None
 
     @property
     def name(self) -> str:
@@ -76,7 +61,7 @@ class Outcome:
 
 
 def fit_channels(
-    series: "Mapping[str, pd.Series]",
+    series: Mapping[str, pd.Series],
     out: str | os.PathLike,
     options: FitOptions,
     cleaning: Cleaning,
@@ -85,8 +70,8 @@ def fit_channels(
     workers: int | None = None,
     engine: str = "local",
     speaks: bool = False,
-    run: CoarseRun | None = None,
-    commands: "np.ndarray | None" = None,
+    read_run: Callable[..., Recording] | None = None,
+    commands: np.ndarray | None = None,
 ) -> tuple[dict[str, dict], dict[str, str]]:
     """Fits simulators to channels, saves them together with their reports, and prints the reports.
 
@@ -97,10 +82,10 @@ def fit_channels(
         cleaning: Settings of the cleaning.
         tell: Function that is called with each line of output.
         separately: Whether each channel gets a simulator of its own.
-        workers: Number of channels that are fitted at the same time, each in its own process. None: one per CPU; 0: all in this process.
-        engine: How worker processes are run: `local` or `ray`. Neither it nor the number of workers changes the results.
+        workers: Number of processes. None: one per CPU; 0: all in this process. Neither it nor the engine changes the results.
+        engine: How worker processes are run: `local` or `ray`.
         speaks: Whether to print lines of progress.
-        run: The recorded run of a coarse simulator, or None.
+        read_run: Reads the run of a coarse simulator, with the argument `interval_s` of `read_recording`; None if there is none.
         commands: Commands of the samples of a single channel, shape `(samples, commands)`, or None.
 
     Returns:
@@ -117,7 +102,7 @@ def fit_channels(
         )
     here, speaks = Path(os.path.abspath(out)), speaks and engine == "local"
     groups = [{name: each} for name, each in series.items()] if separately else [dict(series)]
-    jobs = [Job(group, here, options, cleaning, speaks, run, commands) for group in groups]
+    jobs = [Job(group, here, options, cleaning, speaks, read_run, commands) for group in groups]
     for job in jobs:
         for name in (job.name, *job.series):
             refuse_foreign(folder_of(here, name))
@@ -127,8 +112,7 @@ def fit_channels(
     in_this_process = workers == 0 or (len(jobs) == 1 and engine == "local")
     try:
         for outcome in map(fit_or_say, jobs) if in_this_process else _fitted_by_processes(jobs, engine, workers):
-            reports |= outcome.reports
-            failed |= outcome.failed
+            reports, failed = reports | outcome.reports, failed | outcome.failed
             for line in outcome.lines:
                 tell(line)
     finally:
@@ -152,11 +136,8 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
             if not suspects:
                 raise
             if len(some) == 1:
-                reason = (
-                    "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory. "
-                    "Give less telemetry."
-                )
-                yield Outcome(some[0].name, failed=dict.fromkeys(some[0].series, reason))
+                what = "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory."
+                yield Outcome(some[0].name, failed=dict.fromkeys(some[0].series, f"{what} Give less telemetry."))
                 continue
             batches += [(list(waiting.values()), workers)] if waiting else []
             # one at a time, to find the one that kills its worker, and to give it all the memory
@@ -165,50 +146,43 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
 
 def fit_or_say(job: Job) -> Outcome:
     """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
-    from enhsim_tf.simulator.joint import join_channels
-
     cleaned, outcome = {}, Outcome(job.name)
     for name, series in job.series.items():
-        reason = _reason_of(name, lambda name=name, series=series: cleaned.update({name: _cleaned(name, series, job.cleaning)}))
-        outcome.failed |= {name: reason} if reason else {}
+        with _failing(outcome, [name]):
+            cleaned[name] = _cleaned(name, series, job.cleaning)
     outcome.lines += lines_of([each.report for each in cleaned.values()])
     for telemetry in join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []:
-        names = name_of_channels(telemetry.columns)
-        reason = _reason_of(names, lambda telemetry=telemetry: _fit_group(telemetry, cleaned, job, outcome))
-        outcome.failed |= dict.fromkeys(telemetry.columns, reason) if reason else {}
+        with _failing(outcome, telemetry.columns):
+            _fit_group(telemetry, cleaned, job, outcome)
     return outcome
 
 
-def _cleaned(name: str, series: "pd.Series", cleaning: Cleaning) -> "Cleaned":
-    import numpy as np
-
-    from enhsim_tf.telemetry.series import check_values
-
+def _cleaned(name: str, series: pd.Series, cleaning: Cleaning) -> Cleaned:
     cleaned = clean(series, cleaning)
     check_values(np.concatenate([part.values for part in cleaned.parts]), name)
     return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
 
 
-def _reason_of(name: str, work: Callable[[], None]) -> str | None:
-    """Does work and returns why it could not be done, or None."""
+@contextlib.contextmanager
+def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
+    """Notes why work on channels could not be done."""
     try:
-        work()
+        yield
     except InputError as error:
-        return str(error)
+        outcome.failed |= dict.fromkeys(names, str(error))
     except (OSError, MemoryError) as error:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory"
         raise InputError(
-            f"Expected enough memory and disk space for {printable(name)}. Received: {reason}. Finished channels are kept; free some space."
+            f"Expected enough memory and disk space for {printable(name_of_channels(names))}. Received: {reason}. Finished channels are kept; "
+            "free some space."
         ) from error
     except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        reason = " ".join(str(error).split())[:200]
-        place = f"{Path(where.filename).name}, line {where.lineno}"
-        return f"Expected a fit. Received: {type(error).__name__}: {reason}, in {place}. Please report this defect."
-    return None
+        where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
+        said = f"{type(error).__name__}: {reason}, in {Path(where.filename).name}, line {where.lineno}"
+        outcome.failed |= dict.fromkeys(names, f"Expected a fit. Received: {said}. Please report this defect.")
 
 
-def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Job, outcome: Outcome) -> None:
+def _fit_group(telemetry: Recording, cleaned: Mapping[str, Cleaned], job: Job, outcome: Outcome) -> None:
     """Fits and saves one simulator. Nothing is written if a step fails."""
     from enhsim_tf.simulator.figures import report_figure
     from enhsim_tf.simulator.fitting import fit
@@ -216,7 +190,9 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
     name = name_of_channels(telemetry.columns)
     progress = Progress(_tell_if_heard, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
     commands = job.commands if len(job.series) == 1 else None
-    simulator, report = fit(telemetry, _run_of(job, telemetry), job.options, progress, commands)
+    interval_s = telemetry.interval_s if telemetry.start is not None else None
+    run = None if job.read_run is None else job.read_run(interval_s=interval_s)
+    simulator, report = fit(telemetry, run, job.options, progress, commands)
     folder = folder_of(job.out, name)
     refuse_foreign(folder)  # checked again, because the fit took time
     instead = ", in place of the one that was there" if (folder / MANIFEST).is_file() else ""
@@ -229,15 +205,6 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
     here = os.path.relpath(folder)
     shown = folder if here.startswith("..") else here  # from here, its full path if it is elsewhere
     outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/{instead}"]
-
-
-def _run_of(job: Job, telemetry: "Recording") -> "Recording | None":
-    if job.run is None:
-        return None
-    from enhsim_tf.coarse_simulator.recording_files import read_recording
-
-    interval_s = telemetry.interval_s if telemetry.start is not None else None
-    return read_recording(job.run.source, job.run.columns, job.run.time, job.cleaning.of_run(min_part=2), interval_s, job.run.start)
 
 
 def _tell_if_heard(line: str) -> None:

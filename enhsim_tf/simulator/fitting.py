@@ -21,7 +21,7 @@ from enhsim_tf.noise.names import BEST as BEST_NOISE
 from enhsim_tf.simulator.alignment import Runs, Waves, pair_recordings
 from enhsim_tf.simulator.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse
 from enhsim_tf.simulator.detector_choice import choose_detector, judge_detectors
-from enhsim_tf.simulator.joint import cut, join_channels, long_enough, split_end, telemetry_of, times_of
+from enhsim_tf.simulator.joint import join_channels, long_enough, split_end, telemetry_of, times_of, windows_of
 from enhsim_tf.simulator.noise_choice import JUDGED_SHARE, NoiseWindows, choose_noise
 from enhsim_tf.simulator.options import LEAST_LEARNT, FitOptions, default_window
 from enhsim_tf.simulator.report import Report, make_report
@@ -65,8 +65,8 @@ def fit(
         InputError: If the telemetry is constant or too short, if channels share too little time, or if the coarse run does not fit.
     """
     options, recording = options or FitOptions(), _recording_of(telemetry)
-    for channel, name in enumerate(recording.columns):
-        values = check_values(np.concatenate([part.values[:, channel] for part in recording.parts]), name)
+    for name, values in zip(recording.columns, recording.values.T, strict=True):
+        check_values(values, name)
         low, high = float(np.min(values)), float(np.max(values))
         if not (max(-low, high) <= _MOST_SIZE and high - low >= _LEAST_SPAN):
             raise InputError(
@@ -102,12 +102,12 @@ def _fit_waves(
 ) -> tuple[EnhancedSimulator, Report]:
     learnt, held_out, note = _split(recording, options.held_out)
     channels, refused = recording.columns, {}
+    commands = commands if len(channels) == 1 else None
     while True:
-        commands = commands if len(channels) == 1 else None
-        choices = [
-            choose_coarse(telemetry_of(learnt, channel), options.window, commands, refused.get(channel)) for channel in range(len(channels))
-        ]
-        said = [choices[0].said] if len(channels) == 1 else [f"{name}: {each.said}" for name, each in zip(channels, choices, strict=True)]
+        choices, said = [], []
+        for channel, name in enumerate(channels):
+            choices.append(choose_coarse(telemetry_of(learnt, channel), options.window, commands, refused.get(channel)))
+            said.append(choices[-1].said if len(channels) == 1 else f"{name}: {choices[-1].said}")
         said = " ".join([*said, note]).strip()
         traces = choices[0].traces
         if traces is not None:
@@ -139,8 +139,7 @@ def _split(recording: Recording, share: float) -> tuple[Recording, Recording | N
     learnt, held_out = split_end(recording, share)
     if share and len(learnt) < LEAST_SAMPLES <= len(recording):
         return recording, None, f"Nothing is held out, because the record has only {len(recording):,} samples."
-    values = np.concatenate([part.values for part in learnt.parts])
-    if share and (np.ptp(values, axis=0) == 0).any():
+    if share and (np.ptp(learnt.values, axis=0) == 0).any():
         return recording, None, f"Nothing is held out, because the first {1 - share:.0%} of the record is constant."
     return learnt, held_out, ""
 
@@ -158,17 +157,17 @@ def _fit_aligned(
     progress: Progress,
     said: str,
 ) -> tuple[EnhancedSimulator, Report]:
-    channels, series = learnt.columns, [part.values for part in learnt.parts]
+    channels = learnt.columns
     number = _num_windows(options, window, len(channels))
-    starts = random_window_starts(series, window, number, np.random.default_rng(options.seed))
-    targets, times = cut(series, starts, window), times_of(learnt, starts, window)
+    starts = random_window_starts(learnt.parts, window, number, np.random.default_rng(options.seed))
+    targets, times = windows_of(learnt, starts, window), times_of(learnt, starts, window)
     waves = Waves([each.coarse for each in choices], channels, learnt.interval_s, window).on_one_clock(targets)
     waves, coarse, wanted, kept = _learn_waveforms(waves, targets, times)
     is_level = all(isinstance(each, ConstantLevel) for each in waves.simulators)
-    name = options.enhancer if not is_level else COARSE
-    choice = choose_enhancer(coarse, wanted, times[kept], name, options.seed, options.epochs, _told(progress))
-    places = evenly_spaced_starts(series, window, _NUM_LEVELS)
-    shift, gain = waves.align(cut(series, places, window))[1:]
+    enhancer = COARSE if is_level else options.enhancer
+    choice = choose_enhancer(coarse, wanted, times[kept], enhancer, options.seed, options.epochs, progress)
+    places = evenly_spaced_starts(learnt.parts, window, _NUM_LEVELS)
+    _, shift, gain = waves.align(windows_of(learnt, places, window))
     is_flat = waves.is_flat(gain)
     followed = ~is_flat.any(axis=1)
     if not followed.any():
@@ -178,11 +177,11 @@ def _fit_aligned(
     simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, levels=levels, nominal=learnt, level_step=step)
 
     def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
-        windows = cut([part.values for part in some.parts], places, window)
+        windows = windows_of(some, places, window)
         clean = simulator.enhance(*waves.align(windows))
         return NoiseWindows(windows - clean, clean, times_of(some, places, window))
 
-    everything = noise_windows(learnt, random_window_starts(series, window, number, np.random.default_rng([options.seed, 1])))
+    everything = noise_windows(learnt, random_window_starts(learnt.parts, window, number, np.random.default_rng([options.seed, 1])))
     halves = [_evenly(each, window, number, noise_windows) for each in split_end(learnt, JUDGED_SHARE)]
     return _finish(simulator, choice, halves, everything, options, held_out, None, said, [], progress)
 
@@ -243,22 +242,21 @@ def _fit_runs(
             f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {0 if learnt is None else len(learnt):,} samples that "
             f"{recording.name} and {run.name} share, in stretches at least as long as a window. Give longer runs or a smaller --window."
         )
-    series, coarse_series = ([part.values for part in each.parts] for each in (learnt, learnt_run))
     number = _num_windows(options, window, len(recording.columns))
-    starts = evenly_spaced_starts(series, window, number)
-    inputs, targets, times = cut(coarse_series, starts, window), cut(series, starts, window), times_of(learnt, starts, window)
-    choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, _told(progress))
+    starts = evenly_spaced_starts(learnt.parts, window, number)
+    (inputs, targets), times = (windows_of(each, starts, window) for each in (learnt_run, learnt)), times_of(learnt, starts, window)
+    choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, progress)
     known = None if isinstance(coarse, Recording) else coarse
     alignment = Runs(learnt_run, window, delay.seconds, known, name_of(coarse), commands)
     simulator = EnhancedSimulator(alignment, choice.enhancer, None, recording.columns, recording.interval_s, nominal=learnt)
     residuals = _held_out_residuals(simulator, choice, inputs, targets, times, options)
 
     def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
-        noise, clean = np.split(cut([part.values for part in some.parts], places, window), 2, axis=2)
+        noise, clean = np.split(windows_of(some, places, window), 2, axis=2)
         return NoiseWindows(noise, clean, times_of(some, places, window))
 
-    everything, *judged = (_evenly(some, window, number, noise_windows) for some in (residuals, *split_end(residuals, JUDGED_SHARE)))
-    return _finish(simulator, choice, judged, everything, options, held_out, held_out_run, said, [*notes, *left_out], progress)
+    everything, *halves = (_evenly(some, window, number, noise_windows) for some in (residuals, *split_end(residuals, JUDGED_SHARE)))
+    return _finish(simulator, choice, halves, everything, options, held_out, held_out_run, said, [*notes, *left_out], progress)
 
 
 def _run_of(coarse: CoarseSimulator, recording: Recording) -> tuple[Recording, list[str]]:
@@ -294,7 +292,7 @@ def _on_delay(delay: Delay, telemetry: Telemetry, was_given: bool) -> str:
 
 def _without_constant(run: Recording) -> tuple[Recording, list[str]]:
     """Leaves out coarse columns that never vary, because an enhancer learns nothing from them."""
-    varies = np.ptp(np.concatenate([part.values for part in run.parts]), axis=0) > 0
+    varies = np.ptp(run.values, axis=0) > 0
     kept, gone = ([name for name, does in zip(run.columns, varies, strict=True) if does == wanted] for wanted in (True, False))
     if not kept:
         raise InputError(f"Expected a coarse column that varies. Received: only constant ones in {run.name}: {', '.join(gone)[:120]}.")
@@ -314,9 +312,8 @@ def _held_out_residuals(
         enhancer: Enhancer = choice.without_fold
         if fold:
             kept, _ = split_fold(times, window, choice.edges, fold)
-            enhancer = fit_enhancer(
-                enhancer.name, inputs[kept], targets[kept], times[kept], options.seed, options.epochs, enhancer.penalties
-            )
+            windows = inputs[kept], targets[kept], times[kept]
+            enhancer = fit_enhancer(enhancer.name, *windows, options.seed, options.epochs, choice.penalties)
         other = EnhancedSimulator(simulator.alignment, enhancer, None, simulator.channels, simulator.interval_s)
         for block in range(fold, len(choice.edges) - 1, NUM_FOLDS):
             for part, coarse in zip(learnt.parts, run.parts, strict=True):
@@ -337,14 +334,10 @@ def _evenly(
     usable = long_enough(recording, window)
     if usable is None:
         return NoiseWindows(*np.zeros((2, 0, window, 1), np.float32), np.zeros(0, int))
-    return windows_at(usable, evenly_spaced_starts([part.values for part in usable.parts], window, number))
+    return windows_at(usable, evenly_spaced_starts(usable.parts, window, number))
 
 
 # both
-
-
-def _told(progress: Progress) -> Any:
-    return lambda name: progress.step(f"enhancer {name}")
 
 
 def _finish(
@@ -361,8 +354,7 @@ def _finish(
 ) -> tuple[EnhancedSimulator, Report]:
     """Fits the noise and chooses the detector. What held-out time contradicts is not shipped: the next noise model is taken then."""
     learnt, run = simulator.nominal, simulator.nominal_run
-    values = np.concatenate([part.values for part in learnt.parts])
-    simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(values.shape[1]))
+    simulator.quantisation = tuple(map(Levels.find, learnt.values.T))
     progress.step("noise")
     is_there = bool(np.std(everything.noise, dtype=np.float64) > 0)  # noise of size 0 cannot be judged
     rows: list[dict[str, Any]] = []

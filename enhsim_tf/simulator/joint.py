@@ -96,10 +96,7 @@ def long_enough(recording: Recording | None, window: int) -> Recording | None:
 
 
 def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.ndarray:
-    """Cuts windows out of contiguous series of shape `(samples, columns)`, float32 of shape `(windows, samples, columns)`.
-
-    Starts are counted over all possible starts, as in `telemetry.windows`.
-    """
+    """Cuts windows out of series `(samples, columns)`, float32 of shape `(windows, samples, columns)`; starts as in `telemetry.windows`."""
     usable = [each for each in series if len(each) >= window]
     which, places = places_in_parts(usable, starts, window)
     windows = np.empty((len(starts), window, series[0].shape[1]), np.float32)
@@ -108,6 +105,11 @@ def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.nda
         view = np.lib.stride_tricks.sliding_window_view(usable[number], window, axis=0)
         windows[rows] = view[places[rows]].transpose(0, 2, 1)
     return windows
+
+
+def windows_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarray:
+    """Cuts windows out of the parts of a recording, see `cut`."""
+    return cut([part.values for part in recording.parts], starts, window)
 
 
 def times_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from enhsim_tf.common.atomic_files import encode_name, replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json
+from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json, short_reason
 
 MANIFEST, _SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
 _MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
@@ -75,15 +75,9 @@ def refuse_foreign(folder: str | os.PathLike) -> None:
 
 
 def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> None:
-    """Writes a simulator to a folder atomically: if a step fails, the folder is left unchanged. A simulator that was there is replaced.
+    """Writes a simulator to a folder atomically, in place of one that was there: its arrays by part and name, and settings in plain JSON types.
 
-    Args:
-        folder: The folder.
-        arrays: For each part of the simulator, such as `enhancer`, its arrays by name.
-        settings: All other settings, in plain JSON types.
-
-    Raises:
-        InputError: If the folder contains something other than a saved simulator, or if a number is not finite.
+    Raises InputError if the folder contains something else, or if a number is not finite.
     """
     refuse_foreign(folder)
     bad = [part for part, named in arrays.items() if not all(np.isfinite(each).all() for each in named.values())]
@@ -151,5 +145,4 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, Mapping[s
             raise ValueError("the simulator was replaced while it was read; try again")
         return make(arrays, settings)
     except READ_ERRORS as error:
-        reason = (str(error).splitlines() or [""])[0]
-        raise InputError(f"Expected the arrays and settings of a model. Received: {folder} ({reason}).") from None
+        raise InputError(f"Expected the arrays and settings of a model. Received: {folder} ({short_reason(error)}).") from None

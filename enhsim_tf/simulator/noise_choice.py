@@ -41,14 +41,11 @@ _DRAW = 73  # number of the random draw
 
 @dataclasses.dataclass(frozen=True)
 class NoiseWindows:
-    """Windows of noise and the enhanced windows below them, of shape `(windows, samples, channels)` or without the last axis.
-
-    The noise is telemetry minus enhanced signal; `starts` are the first samples of the windows, which generated noise does not need.
-    """
+    """Windows of noise, telemetry minus enhanced signal, of shape `(windows, samples, channels)` or without the last axis."""
 
     noise: np.ndarray
-    clean: np.ndarray
-    starts: np.ndarray | None = None
+    clean: np.ndarray  # the enhanced windows below them
+    starts: np.ndarray | None = None  # first sample of each window; None of generated noise
 
     @functools.cached_property
     def disjoint(self) -> "NoiseWindows":
@@ -73,25 +70,15 @@ class NoiseWindows:
 
 @dataclasses.dataclass(frozen=True)
 class CandidateJudgement:
-    """How a candidate does on held-out noise.
-
-    Args:
-        name: Name of the noise model.
-        auc: AUC of a classifier that separates generated from held-out real windows; None if false alarms or recall had decided.
-        real_auc: The same for real against other real windows: the floor.
-        alarms: False-alarm rate on held-out real windows, mean over the cheap detectors, trained on generated windows.
-        real_alarms: The same for detectors trained on real windows.
-        recall: Share of injected anomalies that the same detectors find, mean over kinds, severities and detectors.
-        real_recall: The same for detectors trained on real windows.
-    """
+    """How a candidate does on held-out noise."""
 
     name: str
-    auc: float | None
-    real_auc: float
-    alarms: float
-    real_alarms: float
-    recall: float
-    real_recall: float
+    auc: float | None  # of a classifier that separates generated from held-out real windows; None if false alarms or recall had decided
+    real_auc: float  # the same for real against other real windows: the floor
+    alarms: float  # false-alarm rate on held-out real windows, mean over the cheap detectors, trained on generated windows
+    real_alarms: float  # the same for detectors trained on real windows
+    recall: float  # share of injected anomalies that these detectors find, mean over kinds, severities and detectors
+    real_recall: float  # the same for detectors trained on real windows
 
     @property
     def _excesses(self) -> tuple[float, float, float]:
@@ -125,7 +112,7 @@ def choose_noise(
     quantisation: Sequence[Levels | None] = (),
     with_signal: bool = True,
 ) -> tuple[NoiseModel, list[dict[str, Any]], list[str]]:
-    """Judges candidates on held-out telemetry, and returns the chosen one, fitted to all of the time.
+    """Judges candidates that are fitted to windows of the first part of the time on those of the last.
 
     Args:
         learnt: Windows of the first part of the time, in order.
@@ -136,8 +123,8 @@ def choose_noise(
         with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
 
     Returns:
-        The noise model; for each candidate that was tried the fields of `CandidateJudgement`, `passes` and `is_chosen`; and what is to be
-        said. The list is empty if there is too little telemetry to judge; whole residual windows are drawn then.
+        The chosen model, fitted to everything; for each candidate that was tried the fields of `CandidateJudgement`, `passes` and
+        `is_chosen`, none if there is too little telemetry to judge; and what is to be said.
     """
     if min(len(judged), len(learnt)) < _LEAST_WINDOWS or len(pieces_of(learnt, judged)[0]) < _LEAST_WINDOWS:
         note = "there is too little telemetry to judge noise models; whole residual windows are drawn"
@@ -164,11 +151,10 @@ def choose_noise(
 
 
 class HeldOutJudge:
-    """Judges noise models on held-out telemetry. What concerns real noise alone is computed once, for all candidates.
+    """Judges noise models on held-out telemetry; what concerns real noise alone is computed once. The arguments are those of `choose_noise`.
 
     The classifier sees disjoint windows only, cut into pieces if there are few of them: it recognises single windows that overlap, whatever
     their noise is like. Of each candidate as many are generated: of more, some would repeat real noise if it draws real windows again.
-    The arguments are those of `choose_noise`.
     """
 
     def __init__(
@@ -246,14 +232,9 @@ def _channels(windows: np.ndarray) -> list[np.ndarray]:
 def anomalous_windows(
     nominal: np.ndarray, noise_sd: np.ndarray, seed: int, number: int, severities: Sequence[float] = SEVERITIES
 ) -> dict[tuple[str, float], np.ndarray]:
-    """Injects anomalies of every kind and severity into nominal windows, each into one channel.
+    """Injects anomalies of every kind and severity, in units of the noise of each channel, into one channel of nominal windows.
 
-    Args:
-        nominal: Nominal windows, shape `(windows, samples, channels)` or without the last axis, in the order of time.
-        noise_sd: Standard deviation of the noise of each channel, the unit of severity.
-        seed: Seed of positions and channels.
-        number: Number of windows of each kind and severity, evenly spaced over the nominal ones; three durations alternate.
-        severities: Severities.
+    For each kind and severity, `number` windows are taken evenly from the nominal ones, in the order of time; three durations alternate.
     """
     chosen = nominal[np.linspace(0, len(nominal) - 1, min(number, len(nominal))).astype(int)]
     durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]

@@ -38,8 +38,8 @@ def find_departure(
 ) -> Departure | None:
     """Finds a departure that lasts until the end of the telemetry; None if the flags do not last.
 
-    Scores have the shape `(samples,)`, with NaN where nothing was scored; `score_series` is that of a `Scorer`, and `judged` what it has judged:
-    for each stretch its first sample and a series of shape `(samples, channels)`.
+    Scores are NaN where nothing was scored; `score_series` is that of a `Scorer`, and `judged` are the first sample and the series of shape
+    `(samples, channels)` of each stretch that it has judged.
     """
     window, has_left = simulator.window, scores > 1
     learnt = [] if simulator.nominal is None else simulator.judged_series(simulator.nominal, simulator.nominal_run)
@@ -70,11 +70,7 @@ def find_departure(
 
 
 def lasting(has_left: np.ndarray, is_scored: np.ndarray, window: int) -> int | None:
-    """Returns the first sample of a departure that lasts until the end, or None.
-
-    From there on at least `LEAST_FLAGGED` of the scored samples are flagged, or in a window whose level or amplitude was never seen, over at
-    least `LEAST_WINDOWS` windows.
-    """
+    """Returns the first sample from which on at least `LEAST_FLAGGED` of the scored samples have left, over `LEAST_WINDOWS` windows; or None."""
     places = np.flatnonzero(is_scored)
     flags = has_left[places]
     following = np.cumsum(flags[::-1])[::-1] / np.arange(len(flags), 0, -1)
@@ -118,11 +114,7 @@ def changed_properties(nominal: np.ndarray, after: np.ndarray) -> tuple[str, ...
 
 
 def properties(windows: np.ndarray) -> dict[str, np.ndarray]:
-    """Measures level, amplitude, period and the relation of the channels of each window of shape `(samples, channels)`.
-
-    They are the mean, the standard deviation, the logarithm of the mean frequency, and the correlations of all pairs of channels, each of shape
-    `(windows, values)`.
-    """
+    """Mean, standard deviation, logarithm of the mean frequency, and correlations of pairs of channels of windows, shape `(windows, values)`."""
     values = np.asarray(windows, np.float64)
     centred = values - values.mean(axis=1, keepdims=True)
     power = np.abs(np.fft.rfft(centred, axis=1)) ** 2

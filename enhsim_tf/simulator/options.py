@@ -118,26 +118,21 @@ def add_options(parser: argparse.ArgumentParser, options: type, *names: str) -> 
     """Adds fields of a class of options, given by name, to a parser or a group of it."""
     fields = {field.name: field for field in dataclasses.fields(options)}
     for name in names:
-        field = fields[name]
-        word = "--" + name.removesuffix("_s").replace("_", "-")
-        if field.metadata["choices"]:
-            spelled = tuple(map(option_name, field.metadata["choices"]))
-            parser.add_argument(word, dest=name, choices=spelled, default=option_name(field.default), help=field.metadata["help"])
+        default, about = fields[name].default, fields[name].metadata
+        if about["choices"]:
+            given = {"choices": tuple(map(option_name, about["choices"])), "default": option_name(default)}
         else:
             metavar = {"held_out": "SHARE", "false_alarm_rate": "SHARE", "delay_s": "SECONDS"}.get(name, "N")
-            parser.add_argument(
-                word, dest=name, type=field.metadata["kind"], default=field.default, metavar=metavar, help=field.metadata["help"]
-            )
+            given = {"type": about["kind"], "default": default, "metavar": metavar}
+        parser.add_argument("--" + name.removesuffix("_s").replace("_", "-"), dest=name, help=about["help"], **given)
 
 
 def options_from(namespace: argparse.Namespace, options: type) -> Any:
     """Makes an object of a class of options from a parsed command line; raises InputError if a value is out of range."""
     found = {}
     for field in dataclasses.fields(options):
-        if hasattr(namespace, field.name):
-            value = getattr(namespace, field.name)
-            spelled = {option_name(each): each for each in field.metadata.get("choices", ())}
-            found[field.name] = spelled.get(value, value) if isinstance(value, str) else value
+        value, spelled = getattr(namespace, field.name), {option_name(each): each for each in field.metadata["choices"]}
+        found[field.name] = spelled.get(value, value)
     return options(**found)
 
 

@@ -11,7 +11,7 @@ from enhsim_tf.common.errors import printable, spoken
 from enhsim_tf.enhancer.candidates import Choice, fit_enhancer
 from enhsim_tf.enhancer.names import COARSE
 from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
-from enhsim_tf.simulator.joint import cut, nrmse
+from enhsim_tf.simulator.joint import nrmse, windows_of
 from enhsim_tf.simulator.noise_choice import TOLD_APART
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
@@ -23,44 +23,24 @@ _FLOORS = 3.0  # cross-correlations further apart than this multiple of the floo
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Report:
-    """The report on a fitted simulator.
-
-    Args:
-        channels: Names of the channels.
-        window: Length of a window in samples.
-        is_held_out: Whether the telemetry of the measurements was held out from the fit.
-        num_samples: Number of its samples.
-        coarse: Which coarse simulator was used and why.
-        notes: What else is to be said.
-        enhancers: For each enhancer that was judged, its `name`, `error` (NRMSE), `standard_error` and `is_chosen`.
-        nrmse: For each channel, the root-mean-square error of `coarse` and `enhanced` divided by the standard deviation of the telemetry.
-        noise_model: Name of the noise model.
-        noise_candidates: Rows of `noise_choice.choose_noise`; empty if the model was asked for, or there was too little to judge on.
-        cross_correlation: For several channels, the largest difference between correlations of generated and real noise (`apart`), the same
-            between two halves of the real noise (`floor`), and the pair of channels.
-        detectors: Each detector on held-out time, see `detector_choice.JudgedDetector`.
-        detector: The one that `score` uses.
-        keeps_promise: Whether it flags no more of held-out nominal time than it may.
-        outside: For recorded runs, the share of that time outside the training range of the coarse columns; otherwise None.
-        examples: Windows for the figure: `coarse`, `enhanced`, `generated` and `real`, each of shape `(samples, channels)`.
-    """
+    """The report on a fitted simulator."""
 
     channels: list[str]
     window: int
-    is_held_out: bool
-    num_samples: int
-    coarse: str
-    notes: list[str]
-    enhancers: list[dict[str, Any]]
-    nrmse: dict[str, dict[str, float]]
+    is_held_out: bool  # whether the telemetry of the measurements was held out from the fit
+    num_samples: int  # of that telemetry
+    coarse: str  # which coarse simulator was used and why
+    notes: list[str]  # what else is to be said
+    enhancers: list[dict[str, Any]]  # `name`, `error` (NRMSE), `standard_error` and `is_chosen` of each that was judged
+    nrmse: dict[str, dict[str, float]]  # of each channel, the error of `coarse` and `enhanced` in standard deviations of the telemetry
     noise_model: str
-    noise_candidates: list[dict[str, Any]]
-    cross_correlation: dict[str, Any]
-    detectors: list[dict[str, Any]]
-    detector: str
-    keeps_promise: bool
-    outside: float | None
-    examples: dict[str, np.ndarray]
+    noise_candidates: list[dict[str, Any]]  # of `noise_choice.choose_noise`; empty if the model was asked for or could not be judged
+    cross_correlation: dict[str, Any]  # of several channels, see `_cross_correlation`
+    detectors: list[dict[str, Any]]  # see `detector_choice.JudgedDetector`
+    detector: str  # the one that `score` uses
+    keeps_promise: bool  # whether it flags no more of held-out nominal time than it may
+    outside: float | None  # of recorded runs, the share of that time outside the training range of the coarse columns
+    examples: dict[str, np.ndarray]  # for the figure: `coarse`, `enhanced`, `generated` and `real`, each of shape `(samples, channels)`
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all fields except the examples, in plain JSON types."""
@@ -70,11 +50,6 @@ class Report:
         """Returns the report as lines of text: the warning, if there is one, comes first."""
         name = spoken(self.channels)
         where = "held-out time" if self.is_held_out else "the telemetry of the fit (none was held out)"
-        rates = []
-        for each in self.detectors:
-            relations = [each["by_kind"][kind] for kind in RELATIONS if kind in each["by_kind"]]  # of several channels
-            least = f" ({min(relations):.0%} of relations)" if relations else ""
-            rates.append(f"{each['name']} {each['false_alarms']:.1%} and {each['recall']:.0%}{least}")
         found = [
             *self._warnings(),
             self.coarse,
@@ -84,7 +59,7 @@ class Report:
             self._of_signals(),
             self._of_noise(),
             self._of_cross_correlation(),
-            f"detectors there, set for {RATE:.0%} (false alarms, and recall of injected anomalies): {'; '.join(rates)}. score uses: {self.detector}",
+            self._of_detectors(),
         ]
         if self.outside is not None:
             found.append(f"range: {self.outside:.1%} of that time are outside the training range of the coarse columns")
@@ -120,18 +95,26 @@ class Report:
     def _of_noise(self) -> str:
         if not self.noise_candidates:
             return f"noise: {self.noise_model}"
-        aucs = ["-" if each["auc"] is None else f"{each['auc']:.2f}" for each in self.noise_candidates]
-        judged = "; ".join(
-            f"{each['name']} {auc}, {each['alarms']:.1%} and {each['recall']:.0%}"
-            for each, auc in zip(self.noise_candidates, aucs, strict=True)
-        )
+        judged = []
+        for each in self.noise_candidates:
+            auc = "-" if each["auc"] is None else f"{each['auc']:.2f}"
+            judged.append(f"{each['name']} {auc}, {each['alarms']:.1%} and {each['recall']:.0%}")
         used = next(each for each in self.noise_candidates if each["is_chosen"])
         real = f"real {used['real_auc']:.2f}, {used['real_alarms']:.1%} and {used['real_recall']:.0%}"
         why = "the simplest that passes" if used["passes"] else "none passes, and it departs least"
         return (
-            f"noise on held-out time (AUC of a classifier against real noise; false alarms and recall of two detectors): {judged}; {real}. "
+            f"noise on held-out time (AUC of a classifier against real noise; false alarms and recall of two detectors): {'; '.join(judged)}; {real}. "
             f"Used: {self.noise_model}, {why if used['name'] == self.noise_model else 'because held-out time contradicts the other'}"
         )
+
+    def _of_detectors(self) -> str:
+        rates = []
+        for each in self.detectors:
+            relations = [each["by_kind"][kind] for kind in RELATIONS if kind in each["by_kind"]]  # of several channels
+            least = f" ({min(relations):.0%} of relations)" if relations else ""
+            rates.append(f"{each['name']} {each['false_alarms']:.1%} and {each['recall']:.0%}{least}")
+        said = f"detectors there, set for {RATE:.0%} (false alarms, and recall of injected anomalies)"
+        return f"{said}: {'; '.join(rates)}. score uses: {self.detector}"
 
     def _of_cross_correlation(self) -> str:
         if not self.cross_correlation:
@@ -154,10 +137,7 @@ def make_report(
     notes: list[str],
     seed: int,
 ) -> Report:
-    """Measures a fitted simulator, whose noise and detector were judged, on telemetry in parts of at least a window and its coarse run.
-
-    `coarse` says which coarse simulator was used and why, `notes` what else is to be said; the seed is that of what is generated.
-    """
+    """Measures a fitted simulator, whose noise and detector were judged, on telemetry in parts of at least a window and its coarse run."""
     real, clean = simulator.windows_and_signal(judged, run, _NUM_WINDOWS)
     plain, outside = _coarse_signal(simulator, real, run)
     noise = real - clean
@@ -193,9 +173,9 @@ def _coarse_signal(simulator: EnhancedSimulator, real: np.ndarray, run: Recordin
     if run is None:
         coarse, shift, gain = simulator.alignment.align(real)
         return shift[:, None] + gain[:, None] * coarse, None
-    series, trusted = [part.values for part in run.parts], TrustedRange(simulator)
-    coarse = cut(series, evenly_spaced_starts(series, simulator.window, _NUM_WINDOWS), simulator.window)
-    outside = np.concatenate([trusted.score_run(each) for each in series]) > 1
+    trusted, starts = TrustedRange(simulator), evenly_spaced_starts(run.parts, simulator.window, _NUM_WINDOWS)
+    coarse = windows_of(run, starts, simulator.window)
+    outside = np.concatenate([trusted.score_run(part.values) for part in run.parts]) > 1
     return fit_enhancer(COARSE, coarse, real, np.arange(len(real))).predict(coarse), float(outside.mean())
 
 
@@ -209,6 +189,7 @@ def correlation_of(windows: np.ndarray) -> np.ndarray:
 
 
 def _cross_correlation(channels: Sequence[str], real: np.ndarray, generated: np.ndarray) -> dict[str, Any]:
+    """The largest difference between correlations of generated and real noise, the pair of channels, and the same of halves of the real one."""
     if len(channels) == 1:
         return {}
     pairs = np.triu_indices(len(channels), 1)

@@ -10,29 +10,26 @@ import itertools
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
-from enhsim_tf.detection.detectors import JointSize
+from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_square
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import RESIDUAL, all_detectors
-from enhsim_tf.detection.residual_size import ResidualSize, root_mean_square
 from enhsim_tf.enhancer.model import run_starts
 from enhsim_tf.simulator.joint import cut, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.trusted_range import TrustedRange
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.windows import mean_over_windows
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; only scores a window apart are independent
 _STRIDES = 8  # number of scored windows that begin within one window length
@@ -57,11 +54,13 @@ class Scorer:
 
     def __init__(self, simulator: EnhancedSimulator, options: ScoreOptions | None = None):
         self.simulator, self.options = simulator, options or ScoreOptions()
-        self.window, self.stride = simulator.window, max(1, simulator.window // _STRIDES)
+        self.window = simulator.window
         self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", DEFAULT))).detector
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
+        # of the generated series, in windows
+        self._length = int(np.clip(_SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS))
         seed = self.options.seed
         if simulator.is_run_model:
             training = simulator.draw_noise(simulator.generate_clean(self.options.num_windows, seed=seed), np.random.default_rng([seed, 3]))
@@ -81,11 +80,6 @@ class Scorer:
         if len(real):
             self.nominal_threshold = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0]
         self.threshold = max(generated, self.nominal_threshold)
-
-    @property
-    def _length(self) -> int:
-        """Length of the generated series in windows."""
-        return int(np.clip(_SERIES_VALUES // (self.window * len(self.simulator.channels)), 100, _THRESHOLD_WINDOWS))
 
     @functools.cached_property
     def nominal_scores(self) -> np.ndarray:
@@ -107,8 +101,10 @@ class Scorer:
         most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, kept)))
 
         def middle(recording: Recording) -> Recording:
-            firsts = [max(0, (len(part) - most) // 2) for part in recording.parts]
-            parts = [Run(part.values[first : first + most]) for part, first in zip(recording.parts, firsts, strict=True)]
+            parts = []
+            for part in recording.parts:
+                first = max(0, (len(part) - most) // 2)
+                parts.append(Run(part.values[first : first + most]))
             return dataclasses.replace(recording, parts=tuple(parts))
 
         series = self.simulator.judged_series(middle(nominal), None if run is None else middle(run))
@@ -122,7 +118,7 @@ class Scorer:
 
     def _raw(self, series: np.ndarray) -> np.ndarray:
         """Scores each sample of a series of shape `(samples, channels)`, without dividing by the threshold."""
-        begins = run_starts(len(series), self.window, self.stride)
+        begins = run_starts(len(series), self.window, max(1, self.window // _STRIDES))
         step = max(1, _CHUNK_VALUES // (self.window * series.shape[1]))
         chunks = (begins[first : first + step] for first in range(0, len(begins), step))
         scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
@@ -146,18 +142,14 @@ class Scorer:
         return self.detector.score(self._judged(windows))
 
     def score_series(self, series: np.ndarray) -> np.ndarray:
-        """Scores every sample.
+        """Scores every sample of a series of `EnhancedSimulator.judged_series`, shape `(samples, channels)`, with at least a window of samples.
 
-        Args:
-            series: A series of `EnhancedSimulator.judged_series`, shape `(samples, channels)`, with at least a window of samples.
-
-        Returns:
-            float64 array of shape `(samples,)`, scaled so that the threshold is 1.
+        Returns float64 of shape `(samples,)`, scaled so that the threshold is 1.
         """
         return self._relative(self._raw(np.asarray(series, np.float32)))
 
     def _relative(self, scores: np.ndarray) -> np.ndarray:
-        # with a threshold that is not positive, the scores are shifted instead
+        """Scores beside the threshold, from which they are shifted if it is not positive."""
         return scores / self.threshold if self.threshold > 0 else 1 + scores - self.threshold
 
 
@@ -167,7 +159,7 @@ def score(
     telemetry: Recording,
     run: Recording | None = None,
     options: ScoreOptions | None = None,
-) -> "pd.DataFrame":
+) -> pd.DataFrame:
     """Scores every sample of telemetry.
 
     Args:
@@ -182,19 +174,15 @@ def score(
         with a lasting departure `score_after` (scores against the new operating point), and with a run `out_of_range` (above 1, the coarse run
         is outside the training range). Samples in parts shorter than a window, or without a run, have NaN in place of scores. `frame.attrs` holds
         `detector`, `expected_false_alarm_rate`, `events` (the rows of `events_table`), `false_alarms_per_day` (with its 95 % interval, on
-        generated telemetry) and `departure` (a sentence, or an empty text).
+        generated telemetry), `departure` (a sentence, or an empty text) and `counts` (whether the clock counts from zero).
 
     Raises:
         InputError: If channels, interval or run do not fit to the simulator, or if every part is shorter than a window.
     """
-    import pandas as pd
-
-    from enhsim_tf.simulator.trusted_range import TrustedRange
-
     check_fits(simulator, telemetry, run)
     scorer = Scorer(simulator, options)
     trusted = None if run is None else TrustedRange(simulator)
-    values = np.concatenate([part.values for part in telemetry.parts])
+    values = telemetry.values
     scores, outside = np.full((2, len(values)), np.nan)
     enhanced, judged = np.full(values.shape, np.nan, np.float32), []
     for place, coarse in _stretches(simulator, telemetry, run):
@@ -217,10 +205,19 @@ def score(
         columns |= dict(zip(names, enhanced.T, strict=True))
     columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
     frame = pd.DataFrame(columns, index=pd.concat([to_series(part) for part in telemetry_of(telemetry)]).index)
-    departure = find_departure(simulator, scorer.score_series, scores, judged)
+    departure, nominal = find_departure(simulator, scorer.score_series, scores, judged), scorer.nominal_scores
+    num_alarms, edges = len(events_of(nominal > 1, gap=scorer.window)), np.cumsum([0, *map(len, telemetry.parts)])
+    frame.attrs = {
+        "detector": scorer.name,
+        "expected_false_alarm_rate": scorer.rate,
+        "false_alarms_per_day": list(false_alarms_per_day(num_alarms, len(nominal) * simulator.interval_s)),
+        "events": event_rows(scores, edges, nominal, scorer.window, simulator.interval_s, departure and departure.begin),
+        "counts": telemetry.clock().counts,
+        "departure": "",
+    }
     if departure is not None:
         frame["score_after"] = departure.scores
-    _note(frame, scorer, np.cumsum([0, *map(len, telemetry.parts)]), departure)
+        frame.attrs["departure"] = _departure_text(frame, departure)
     return frame
 
 
@@ -258,29 +255,19 @@ def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
     return found
 
 
-def _note(frame: "pd.DataFrame", scorer: Scorer, edges: Sequence[int], departure: Departure | None) -> None:
-    """Notes detector, expected false alarms and events in `frame.attrs`, see `score`."""
-    nominal, interval_s, since = scorer.nominal_scores, scorer.simulator.interval_s, departure and departure.begin
-    num_alarms = len(events_of(nominal > 1, gap=scorer.window))
-    frame.attrs["detector"] = scorer.name
-    frame.attrs["expected_false_alarm_rate"] = scorer.rate
-    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(nominal) * interval_s))
-    frame.attrs["events"] = event_rows(frame["score"].to_numpy(), edges, nominal, scorer.window, interval_s, since)
-    frame.attrs["departure"] = ""
-    if departure is not None:
-        when = told_times(frame.index[[since]])[0]
-        when = f"{when:.10g} s" if isinstance(when, float) else when
-        frame.attrs["departure"] = (
-            f"since {when} the telemetry has left what was learnt and stays there "
-            f"({', '.join(departure.what)}): one event. It is a lasting fault, or the new normal: then go on with `update`. score_after are "
-            "scores against the new operating point."
-        )
+def _departure_text(frame: pd.DataFrame, departure: Departure) -> str:
+    when = told_times(frame, frame.index[[departure.begin]])[0]
+    when = f"{when:.10g} s" if isinstance(when, float) else when
+    return (
+        f"since {when} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a lasting fault, or "
+        "the new normal: then go on with `update`. score_after are scores against the new operating point."
+    )
 
 
 def event_rows(
     scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: int | None = None
 ) -> list[dict]:
-    """Returns the events in plain JSON types. Flags of a part within a window of each other are one event, as they share windows.
+    """Returns the events in plain JSON types; flags of a part within a window of each other are one event, as they share windows.
 
     `edges` are the first samples of the parts and the number of samples; from the first sample of a departure on, all is one event.
     """
@@ -305,28 +292,21 @@ def event_rows(
     ]
 
 
-def told_times(index: "pd.Index") -> "pd.Index":
-    """Returns the times as they are written: those in 1970 come from a clock that counts from zero, and are seconds again."""
-    import pandas as pd
-
-    if not isinstance(index, pd.DatetimeIndex) or not len(index) or index[0].year != 1970:
+def told_times(frame: pd.DataFrame, index: pd.Index | None = None) -> pd.Index:
+    """Returns times of scores, those of all samples if none are given, as they are written: of a clock that counts from zero in seconds."""
+    index = frame.index if index is None else index
+    if not frame.attrs["counts"]:
         return index
-    return pd.Index((index - pd.Timestamp(0, tz=index.tz)) / pd.Timedelta(seconds=1), name=index.name)
+    return pd.Index((index - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1), name=index.name)
 
 
-def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
-    """Returns the events in scores, one row per alarm.
+def events_table(frame: pd.DataFrame) -> pd.DataFrame:
+    """Returns the events in the scores that `score` returns, one row per alarm.
 
-    Args:
-        frame: Scores, as returned by `score`.
-
-    Returns:
-        A data frame with the columns `begin`, `end` and `peak` (times of the first flagged sample, of the sample after the last one, and of the
-        highest score; sample numbers if the telemetry has no times), `duration_s`, `num_flagged`, `score` (the highest score; the threshold is
-        1) and `confidence` (see `events.confidences`). Runs of flags that are at most one window apart are one event; so is a lasting departure.
+    Runs of flags that are at most one window apart are one event; so is a lasting departure. The columns are `begin`, `end` and `peak` (times of
+    the first flagged sample, of the sample after the last one, and of the highest score; sample numbers if the telemetry has no times),
+    `duration_s`, `num_flagged`, `score` (the highest score; the threshold is 1) and `confidence` (see `events.confidences`).
     """
-    import pandas as pd
-
     names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence"]
     table = pd.DataFrame(frame.attrs["events"], columns=names)
     index, begin, end = frame.index, table["begin"].to_numpy(int), table["end"].to_numpy(int)
@@ -335,7 +315,7 @@ def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
     else:
         after = index[end - 1] + 1
     places = {"begin": index[begin], "end": after, "peak": index[table["peak"].to_numpy(int)]}
-    return table.assign(**{name: told_times(place) for name, place in places.items()})
+    return table.assign(**{name: told_times(frame, place) for name, place in places.items()})
 
 
 def events_path(path: str | os.PathLike) -> Path:
@@ -343,12 +323,12 @@ def events_path(path: str | os.PathLike) -> Path:
     return Path(path).with_suffix(".events.csv")
 
 
-def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
+def write_scores(path: str | os.PathLike, frame: pd.DataFrame) -> None:
     """Writes what `score` returns to a `.parquet` or `.csv` file, and the events to `events_path`. Both files appear when they are complete."""
+    plain = frame.set_axis(told_times(frame))
+    plain.attrs = {}  # Parquet would store them as JSON
     with replace_file(path) as temporary, replace_file(events_path(path)) as events:
         events_table(frame).to_csv(events, index=False)
-        plain = frame.set_axis(told_times(frame.index))
-        plain.attrs = {}  # Parquet would store them as JSON
         if Path(path).suffix == ".csv":
             plain.to_csv(temporary)
         else:

@@ -6,7 +6,6 @@ It knows nothing of how it is fitted; see `fitting.fit`.
 import dataclasses
 import functools
 import itertools
-import operator
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -21,7 +20,7 @@ from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.noise.candidates import NoiseModel, model_from, state_of
 from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs, Waves, arrays_of_recording, recording_of
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
-from enhsim_tf.simulator.joint import cut, rounded
+from enhsim_tf.simulator.joint import cut, rounded, windows_of
 from enhsim_tf.simulator.model_folder import read_saved, write_saved
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
@@ -91,35 +90,25 @@ class EnhancedSimulator:
     @functools.cached_property
     def noise_sd(self) -> np.ndarray:
         """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
-        noise = self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0))
-        return np.std(noise, axis=(0, 1), dtype=np.float64)
+        return np.std(self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0)), axis=(0, 1), dtype=np.float64)
 
     @functools.cached_property
     def scale(self) -> np.ndarray:
         """Standard deviation of the generated telemetry of each channel, shape `(channels,)`; 1 for a constant one."""
-        deviation = np.std(self.generate_clean(_NUM_NOISE), axis=(0, 1), dtype=np.float64)
-        deviation = np.hypot(deviation, self.noise_sd)
+        deviation = np.hypot(np.std(self.generate_clean(_NUM_NOISE), axis=(0, 1), dtype=np.float64), self.noise_sd)
         return np.where(deviation > 0, deviation, 1.0)
 
     # enhancement
 
     def enhance(self, coarse: np.ndarray, shift: np.ndarray | None = None, gain: np.ndarray | None = None) -> np.ndarray:
-        """Enhances coarse windows; no noise is added (step 5 of the paper's pipeline).
+        """Enhances coarse windows of shape `(windows, samples, columns)`; no noise is added (step 5 of the paper's pipeline).
 
-        Args:
-            coarse: Coarse windows of shape `(windows, samples, columns)`.
-            shift: Offset of each window and channel, shape `(windows, channels)`, or None.
-            gain: Factor likewise.
-
-        Returns:
-            float32 array of shape `(windows, samples, channels)`, in the telemetry's unit.
-
-        Raises:
-            InputError: If the shape is wrong, or a value is not finite.
+        `shift` and `gain` are offset and factor of each window and channel, shape `(windows, channels)`. The result is float32 of shape
+        `(windows, samples, channels)`, in the telemetry's unit. Raises InputError if the shape is wrong or a value is not finite.
         """
-        expected = (self.window, self.enhancer.columns)
-        if np.ndim(coarse) != 3 or np.shape(coarse)[1:] != expected:
-            raise InputError(f"Expected coarse windows of shape (windows, {expected[0]}, {expected[1]}). Received: {np.shape(coarse)}.")
+        columns = self.enhancer.columns
+        if np.ndim(coarse) != 3 or np.shape(coarse)[1:] != (self.window, columns):
+            raise InputError(f"Expected coarse windows of shape (windows, {self.window}, {columns}). Received: {np.shape(coarse)}.")
         enhanced = self.enhancer.predict(coarse)
         if shift is not None and gain is not None:
             enhanced *= gain[:, None].astype(np.float32)
@@ -129,11 +118,7 @@ class EnhancedSimulator:
     def enhance_run(self, coarse: np.ndarray) -> np.ndarray:
         """Enhances one run without gaps, in overlapping windows that are averaged; no noise is added.
 
-        Args:
-            coarse: Values of the coarse columns, shape `(samples, columns)`, with at least a window of samples.
-
-        Returns:
-            float32 array of shape `(samples, channels)`.
+        The run has the shape `(samples, columns)` and at least a window of samples; the result is float32 of shape `(samples, channels)`.
         """
         coarse = np.asarray(coarse, np.float32)
         if coarse.ndim != 2 or coarse.shape[1] != self.enhancer.columns or len(coarse) < self.window:
@@ -149,9 +134,8 @@ class EnhancedSimulator:
         The gain may leave the range of the training by at most a factor of 2, so that a channel that stands still is not explained.
         """
         coarse, _, gain = self.alignment.align(targets)
-        enhanced = self.enhance(coarse)
-        bounded = np.clip(gain, self.levels[:, :, 1].min(axis=0) / 2, self.levels[:, :, 1].max(axis=0) * 2)[:, None]
-        left = targets - bounded * enhanced
+        learnt = self.levels[:, :, 1]
+        left = targets - np.clip(gain, learnt.min(axis=0) / 2, learnt.max(axis=0) * 2)[:, None] * self.enhance(coarse)
         return (left - left.mean(axis=1, keepdims=True)).astype(np.float32)
 
     def windows_and_signal(self, telemetry: Recording, run: Recording | None, number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -159,20 +143,19 @@ class EnhancedSimulator:
 
         For recorded runs, `run` is the coarse run with the same parts.
         """
-        series = [part.values for part in telemetry.parts]
-        starts = evenly_spaced_starts(series, self.window, number)
-        windows = cut(series, starts, self.window)
+        starts = evenly_spaced_starts(telemetry.parts, self.window, number)
+        windows = windows_of(telemetry, starts, self.window)
         if run is None:
             return windows, self.enhance(*self.alignment.align(windows))
         return windows, cut([self.enhance_run(part.values) for part in run.parts], starts, self.window)
 
     def judged_series(self, telemetry: Recording, run: Recording | None) -> list[np.ndarray]:
         """Returns what detectors judge: the parts of the telemetry that have a window, without the enhanced run of the same parts, if given."""
-        long = [number for number, part in enumerate(telemetry.parts) if len(part) >= self.window]
-        series = [telemetry.parts[number].values for number in long]
-        if run is None:
-            return series
-        return [each - self.enhance_run(run.parts[number].values) for number, each in zip(long, series, strict=True)]
+        found = []
+        for number, part in enumerate(telemetry.parts):
+            if len(part) >= self.window:
+                found.append(part.values if run is None else part.values - self.enhance_run(run.parts[number].values))
+        return found
 
     # noise
 
@@ -199,28 +182,22 @@ class EnhancedSimulator:
             float32 array of shape `(num_windows, samples, channels)`, in the telemetry's unit.
 
         Raises:
-            InputError: If `num_windows` is negative or not a whole number.
+            InputError: If `num_windows` is negative or not a whole number, or a scenario cannot be applied.
         """
         return self._joined(num_windows, self.generate_labelled_chunks(num_windows, scenario, seed))
 
-    def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
-        """Returns the windows of `generate` before noise is added."""
-        return self._joined(num_windows, self._chunks(num_windows, scenario, seed, None))
+    def generate_clean(self, num_windows: int, seed: int = 0) -> np.ndarray:
+        """Returns the nominal windows of `generate` before noise is added."""
+        return self._joined(num_windows, self.generate_labelled_chunks(num_windows, None, seed, with_noise=False))
 
     def generate_labelled_chunks(
-        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0
+        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0, with_noise: bool = True
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yields the windows of `generate` in chunks, each with a mask of the samples that the scenario has changed.
 
         Memory does not grow with the number of windows. A sample that is not marked equals that of the same seed without a scenario.
         """
-        return self._chunks(num_windows, scenario, seed, np.random.default_rng([seed, 1]))
-
-    def _chunks(
-        self, num_windows: int, scenario: Degraded | None, seed: int, noise_rng: np.random.Generator | None
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        _check_count("num_windows", num_windows, 0)
-        rng = np.random.default_rng(seed)
+        rng, noise_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1]) if with_noise else None
         starts = rng.integers(0, START_RANGE, num_windows)
         rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
         chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
@@ -270,22 +247,13 @@ class EnhancedSimulator:
     # series
 
     def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
-        """Generates one continuous series of any length, without visible joins between windows.
-
-        Args:
-            num_samples: Length of the series in samples.
-            scenario: A degraded mode over the whole series, or None for nominal telemetry.
-            seed: Random seed of the scenario and the noise.
-
-        Returns:
-            float32 array of shape `(num_samples, channels)`.
-        """
+        """Generates one continuous series, float32 of shape `(num_samples, channels)`; see `generate_labelled_series`."""
         return self.generate_labelled_series(num_samples, scenario, seed)[0]
 
     def generate_labelled_series(
         self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, schedule: Sequence[ScheduledMode] = ()
     ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
-        """Generates the series of `generate_series`, with a mask of the samples that a degraded mode has changed.
+        """Generates one continuous series of any length without visible joins, with a mask of what a degraded mode has changed.
 
         Args:
             num_samples: Length of the series in samples.
@@ -324,7 +292,7 @@ class EnhancedSimulator:
         return values, mask, _changed_events(mask.any(axis=1), events)
 
     def _join_series(self, coarse: np.ndarray, levels: np.ndarray) -> np.ndarray:
-        """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
+        """Enhances a coarse series in windows that overlap by half, and cross-fades them."""
         starts = np.arange(0, len(coarse) - self.window + 1, self.window // 2)
 
         def windows_at(rows: slice) -> np.ndarray:
@@ -359,15 +327,10 @@ class EnhancedSimulator:
     # runs of the user's simulator
 
     def generate_copies(self, run: Recording, num_copies: int, seed: int = 0) -> Iterator[list[np.ndarray]]:
-        """Yields copies of a run: the enhanced run plus another draw of noise in each copy.
+        """Yields copies of a run, for example of a fault: the enhanced run plus another draw of noise in each copy.
 
-        Args:
-            run: A recording, for example of a fault.
-            num_copies: Number of copies.
-            seed: Random seed of the noise. The first copies do not depend on the number of copies.
-
-        Yields:
-            For each copy, one float32 array of shape `(samples, channels)` for each part of `alignment.usable(run)`.
+        A copy is one float32 array of shape `(samples, channels)` for each part of `alignment.usable(run)`. The first copies do not depend on
+        the number of copies.
         """
         _check_count("num_copies", num_copies, 0)
         clean = [self.enhance_run(part.values) for part in self.recorded_runs().usable(run).parts]
@@ -376,13 +339,7 @@ class EnhancedSimulator:
             yield [self.add_noise(enhanced, rng) for enhanced in clean]
 
     def simulate(self, time_s: np.ndarray, scenario: Any = None, seed: int = 0, labels: Mapping[str, Any] | None = None) -> Recording:
-        """Runs the coarse simulator.
-
-        Args:
-            time_s: Times in seconds at the interval of the simulator, shape `(samples,)`.
-            scenario: What differs from nominal operation, in the form that the coarse simulator understands.
-            seed: Random seed of the scenario.
-            labels: Values to carry to every sample, see `recording.record`.
+        """Runs the coarse simulator at times with the interval of this one, see `recording.record`; the seed is that of the scenario.
 
         Raises:
             InputError: If there is no simulator, because this one was loaded and code is not saved.
@@ -406,9 +363,7 @@ class EnhancedSimulator:
     # files
 
     def save(self, folder: str | os.PathLike) -> None:
-        """Saves the simulator to a folder: `arrays.npz`, `settings.json`, and `manifest.json` with their checksums.
-
-        A simulator that was saved there before is replaced.
+        """Saves the simulator to a folder, see `model_folder`, in place of one that was saved there before.
 
         Raises:
             InputError: If the folder contains something else, or if a number is not finite; the folder is left unchanged.
@@ -492,11 +447,7 @@ def _changed_events(changed: np.ndarray, events: Sequence[tuple[Degraded, int, i
 
 
 def _check_count(name: str, count: Any, least: int) -> None:
-    try:
-        is_large_enough = operator.index(count) >= least
-    except TypeError:
-        is_large_enough = False
-    if not is_large_enough:
+    if not (isinstance(count, int | np.integer) and count >= least):
         raise InputError(f"Expected {name} to be a whole number, at least {least}. Received: {name}={count!r}.")
 
 

@@ -1,18 +1,14 @@
 """Detects coarse windows outside the enhancer's training range, for which enhanced windows are extrapolations."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.model import average_windows, run_starts
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.simulator.alignment import START_RANGE
 from enhsim_tf.simulator.joint import cut, spread_of
-
-if TYPE_CHECKING:
-    from enhsim_tf.coarse_simulator.degraded import Degraded
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _RATE = 0.01  # share of nominal windows that count as outside the range
 _NUM_NOMINAL = 900  # coarse windows for fitting the range, and as many others for its limit
@@ -22,7 +18,7 @@ _LEAST_LIMIT = 1e-3  # lower bound of the limit, for periodic coarse windows who
 class TrustedRange:
     """The range of a simulator's nominal coarse windows, the only ones on which its enhancer was trained.
 
-    The score is computed from coarse windows only. It cannot detect an error of the coarse simulator itself.
+    It cannot detect an error of the coarse simulator itself.
 
     Args:
         simulator: A simulator fitted to nominal telemetry.
@@ -32,7 +28,7 @@ class TrustedRange:
     >>> trusted.share_outside(Degraded("stuck", severity=0.5))
     """
 
-    def __init__(self, simulator: "EnhancedSimulator"):
+    def __init__(self, simulator: EnhancedSimulator):
         self.simulator = simulator
         learnt, held_out = (self._drawn(None, _NUM_NOMINAL, seed) for seed in range(2))
         self._centre, self._scale = learnt.mean(axis=(0, 1), dtype=np.float64), spread_of(learnt)
@@ -46,10 +42,7 @@ class TrustedRange:
         return ((windows - self._centre) / self._scale).reshape(len(windows), -1).astype(np.float32)
 
     def score(self, coarse: np.ndarray) -> np.ndarray:
-        """Scores how far coarse windows of shape `(windows, samples, columns)` are outside the training range, float64 of shape `(windows,)`.
-
-        One per cent of nominal windows score above 1.
-        """
+        """Scores coarse windows of shape `(windows, samples, columns)`, float64 of shape `(windows,)`; 1 % of nominal windows are above 1."""
         rows = self._rows(coarse)
         scores = np.sqrt(np.mean(rows**2, axis=1, dtype=np.float64)) if self._range is None else self._range.score(rows)
         return scores / self._limit
@@ -60,10 +53,10 @@ class TrustedRange:
         scores = self.score(cut([np.asarray(coarse, np.float32)], starts, window))
         return average_windows(lambda rows: np.repeat(scores[rows, None, None], window, axis=1), starts, window, len(coarse))[:, 0]
 
-    def share_outside(self, scenario: "Degraded | None", num_windows: int = 200, seed: int = 0) -> float:
+    def share_outside(self, scenario: Degraded | None, num_windows: int = 200, seed: int = 0) -> float:
         """Returns the share of the windows of a scenario that are outside the training range; None is nominal."""
         return float(np.mean(self.score(self._drawn(scenario, num_windows, 2 + seed)) > 1))
 
-    def _drawn(self, scenario: "Degraded | None", num_windows: int, seed: int) -> np.ndarray:
+    def _drawn(self, scenario: Degraded | None, num_windows: int, seed: int) -> np.ndarray:
         rng = np.random.default_rng([seed, 3])
         return self.simulator.alignment.draw(rng.integers(0, START_RANGE, num_windows), [scenario] * num_windows, rng).coarse

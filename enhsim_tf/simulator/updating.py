@@ -21,16 +21,12 @@ _NUM_WINDOWS = 300  # of the held-out end, on which errors are measured
 
 @dataclasses.dataclass(frozen=True)
 class UpdateReport:
-    """What an update changed: the state of the old and of the new simulator on the held-out end of the new telemetry.
-
-    A state is `level`, `gain`, `period_s`, `noise_sd` and `nrmse`, the error of the enhanced signal, of each channel by name, and `alarms`, the
-    share of flagged samples.
-    """
+    """What an update changed: the state of the old and of the new simulator on the held-out end of the new telemetry."""
 
     channels: list[str]
     num_samples: int
     num_held_out: int
-    before: dict[str, Any]
+    before: dict[str, Any]  # `level`, `gain`, `period_s`, `noise_sd` and `nrmse` by channel, and `alarms`, the share of flagged samples
     after: dict[str, Any]
 
     def to_dict(self) -> dict[str, Any]:

@@ -42,6 +42,11 @@ class Telemetry:
         return self.start is not None
 
     @property
+    def counts(self) -> bool:
+        """Whether the times count from a zero of their own, which `start` writes as 1970."""
+        return self.has_time and self.start.startswith("1970")
+
+    @property
     def time_unit(self) -> str:
         """Unit of the time axis: "s", or "samples" if the source has no times."""
         return "s" if self.has_time else "samples"

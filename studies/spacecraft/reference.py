@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection.detectors import ResidualSize
 from enhsim_tf.detection.registry import RESIDUAL
-from enhsim_tf.detection.residual_size import ResidualSize
 from enhsim_tf.telemetry.windows import cut_windows
 from studies.common.settings import Settings
 from studies.spacecraft.judging import STRIDES, Judge

@@ -70,6 +70,8 @@ def test_what_is_no_simulator_and_names_of_columns_are_refused(refused):
     for columns in ([], ["a", "a"], [3]):
         with refused("columns"):
             FunctionSimulator(heater, columns)
+    with refused("regular interval"):
+        record(Tank(), np.array([0.0, 1.0, 3.0]))
 
 
 def test_a_recorded_simulation_keeps_times_and_labels():
@@ -80,8 +82,3 @@ def test_a_recorded_simulation_keeps_times_and_labels():
     np.testing.assert_allclose(
         run.run(np.array([8.0, 9.0]))[:, 0], [np.exp(-8 / 25), np.exp(-8 / 25) / 2 + np.exp(-10 / 25) / 2], rtol=1e-6
     )
-
-
-def test_irregular_times_are_refused(refused):
-    with refused("regular interval"):
-        record(Tank(), np.array([0.0, 1.0, 3.0]))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common import training
+from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer import candidates
 from enhsim_tf.enhancer.candidates import block_edges, choose_enhancer, fit_enhancer, judge, split_fold
@@ -157,10 +158,10 @@ def test_the_simplest_sufficient_candidate_is_chosen(target, expected):
 
 
 def test_a_candidate_that_is_asked_for_is_used_whatever_its_error():
-    coarse = series()
-    named = []
-    found = choose_enhancer(*windows_of(coarse, coarse[:, 0] + coarse[:, 1]), LEVEL_AND_GAIN, on_candidate=named.append)
-    assert found.enhancer.name == LEVEL_AND_GAIN and named == [each.name for each in found.judged] == [COARSE, RIDGE, LEVEL_AND_GAIN]
+    coarse, said = series(), []
+    found = choose_enhancer(*windows_of(coarse, coarse[:, 0] + coarse[:, 1]), LEVEL_AND_GAIN, progress=Progress(said.append))
+    assert found.enhancer.name == LEVEL_AND_GAIN and [each.name for each in found.judged] == [COARSE, RIDGE, LEVEL_AND_GAIN]
+    assert said == [f"enhancer {each.name} ..." for each in found.judged]
 
 
 def test_the_comparison_hand_worked():
@@ -177,21 +178,15 @@ def test_an_error_that_is_one_per_cent_larger_is_as_good(squared, is_within):
     assert first.is_within == is_within
 
 
-def test_held_out_errors_do_not_depend_on_held_out_windows_during_training(monkeypatch):
+def test_candidates_with_one_ridge_regression_are_judged_without_held_out_windows_and_then_fitted_to_all(monkeypatch):
     seen = []
-    monkeypatch.setattr(
-        candidates,
-        "fit_enhancer",
-        lambda name, inputs, targets, starts, *rest: seen.append(starts) or fit_enhancer(name, inputs, targets, starts),
-    )
+    monkeypatch.setattr(candidates, "fit_ridge", lambda *given, **options: seen.append(given[2]) or fit_ridge(*given, **options))
     coarse = series()
     inputs, targets, starts = windows_of(coarse, coarse[:, 0])
-    choose_enhancer(inputs, targets, starts, RIDGE)
-    *judging, refitting = seen
-    edges = block_edges(0, int(starts.max()) + WINDOW, WINDOW)
-    for each in judging:
-        np.testing.assert_array_equal(each, starts[split_fold(starts, WINDOW, edges, 0)[0]])
-    np.testing.assert_array_equal(refitting, starts)
+    choose_enhancer(inputs, targets, starts, RIDGE_AND_FEATURES)
+    learnt = starts[split_fold(starts, WINDOW, block_edges(0, int(starts.max()) + WINDOW, WINDOW), 0)[0]]
+    for found, expected in zip(seen, (learnt, learnt, starts, starts), strict=True):  # of the columns and of the features
+        np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize(
@@ -225,6 +220,7 @@ def test_a_training_that_diverges_is_refused(refused, monkeypatch):
 def test_windows_that_agree_give_the_run_itself(num_samples):
     run = np.random.default_rng(0).standard_normal((num_samples, 2)).astype(np.float32)
     starts = run_starts(num_samples, 32)
+    assert starts[0] == 0 and starts[-1] == num_samples - 32 and np.diff(starts, prepend=0).max() <= 8
     made = average_windows(lambda rows: run[starts[rows, None] + np.arange(32)], starts, 32, num_samples)
     assert made.dtype == np.float32
     np.testing.assert_allclose(made, run, atol=1e-5)
@@ -234,9 +230,3 @@ def test_windows_that_disagree_are_joined_without_a_step():
     starts, levels = run_starts(1_000, 64), np.random.default_rng(0).standard_normal(1_000)
     made = average_windows(lambda rows: np.tile(levels[: len(starts)][rows, None, None], (1, 64, 1)), starts, 64, 1_000)
     assert np.abs(np.diff(made[:, 0])).max() < 0.12  # the levels themselves differ by up to 4
-
-
-def test_every_sample_is_covered_and_the_last_window_ends_with_the_run():
-    starts = run_starts(101, 20)
-    assert starts[0] == 0 and starts[-1] == 81 and np.diff(starts).max() <= 5
-    assert run_starts(20, 20).tolist() == [0] and run_starts(21, 20).tolist() == [0, 1]

@@ -78,8 +78,6 @@ def test_waves_in_phases_that_training_never_had_are_seen_by_their_distance(fitt
 
 
 def test_what_is_refused(fitted, training, refused):
-    with refused("before fit"):
-        OutOfRange().score(training)
     with refused("(windows, 500)", "(1500, 499)"):
         fitted.score(training[:, 1:])
     with refused("finite"):

@@ -11,9 +11,7 @@ def _linear(num_windows, noise=0.1, seed=0, samples=12, outputs=7, columns=2):
     """Windows of two columns of different size, a known linear map of them, and noise."""
     rng = np.random.default_rng(seed)
     inputs = rng.standard_normal((num_windows, samples, columns)) * np.array([1.0, 30.0])[:columns] + 4
-    matrix = np.random.default_rng(99).standard_normal((samples * columns, outputs)) / np.repeat(
-        [[1.0, 30.0][:columns]], samples, 0
-    ).reshape(-1, 1)
+    matrix = np.random.default_rng(99).standard_normal((samples * columns, outputs)) / np.tile([1.0, 30.0][:columns], samples)[:, None]
     clean = inputs.reshape(num_windows, -1) @ matrix + 2
     return inputs, clean + noise * rng.standard_normal(clean.shape), clean
 
@@ -76,14 +74,10 @@ def test_constant_samples_and_constant_columns_do_no_harm():
     np.testing.assert_allclose(constant.predict(np.full((1, 4), 7.0)), [[2.5]])
 
 
-def test_one_window_predicts_itself():
+def test_one_window_predicts_itself_and_the_largest_of_equally_good_penalties_is_chosen():
     found = fit_ridge(np.ones((1, 4)), np.array([[3.0, 5.0]]))
     np.testing.assert_array_equal(found.predict(np.zeros((2, 4))), [[3, 5], [3, 5]])
-    assert found.penalty == max(PENALTIES)
-
-
-def test_the_largest_of_equally_good_penalties_is_chosen():
-    assert fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty == max(PENALTIES)
+    assert found.penalty == fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty == max(PENALTIES)
 
 
 def _of_two_channels(num_windows):

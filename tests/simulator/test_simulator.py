@@ -3,8 +3,11 @@ import pytest
 
 from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
 from enhsim_tf.coarse_simulator.interface import FunctionSimulator
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator import simulator as module
 from enhsim_tf.simulator.simulator import EnhancedSimulator
+from tests.known_simulators import of_waves
 from tests.simulator.conftest import WINDOW, coarse_run, smooth_wave
 
 
@@ -93,3 +96,17 @@ def test_a_simulator_of_runs_is_given_its_code_again(of_run, tmp_path):
 def test_what_is_refused(single, words, use):
     with pytest.raises(InputError, match=words):
         use(single[0])
+
+
+@pytest.mark.parametrize("mode", [None, "drift", "stuck"])
+def test_generated_windows_do_not_depend_on_the_chunks(mode, monkeypatch):
+    waves = [SquareWaveSimulator([SquareWave(period_s=period, low=-0.5, high=0.5)]) for period in (10.0, 17.0)]
+    simulator, scenario = of_waves(waves, 24), mode and Degraded(mode)
+    whole = simulator.generate(23, scenario, seed=5)
+    monkeypatch.setattr(module, "_CHUNK_VALUES", 4 * 24 * 2)
+    assert [len(chunk) for chunk, _ in simulator.generate_labelled_chunks(23, scenario, seed=5)] == [4] * 5 + [3]
+    np.testing.assert_allclose(simulator.generate(23, scenario, seed=5), whole, atol=1e-6)
+    if mode is None:
+        noise = simulator.noise.generate(23, np.random.default_rng([5, 1]))
+        np.testing.assert_allclose(whole, simulator.generate_clean(23, seed=5) + noise, atol=1e-6)
+    assert np.abs(whole - simulator.generate(23, scenario, seed=6)).max() > 0.01
