@@ -1,15 +1,22 @@
-"""Joint noise on four systems of three channels whose relations are known: what is generated keeps them."""
+"""Joint noise on four systems of three channels whose relations are known: what is generated keeps them, and what breaks them is found.
+
+The fault keeps every channel as it is: one channel is that of another time, a whole number of periods away. A model of each channel on its
+own sees nominal windows only, so it finds no more of them than it raises false alarms.
+"""
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from enhsim_tf.simulator.fitting import fit
+from enhsim_tf.simulator.options import ScoreOptions
+from enhsim_tf.simulator.scoring import Scorer
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.slow
 NUM_SAMPLES, PERIOD = 20_000, 90
 DELAY = 15  # samples
+RATE, NUM_FAULTS = 0.01, 300
 LAGS = (-30, -15, -5, 0, 5, 15, 30)
 
 
@@ -96,3 +103,18 @@ def test_generated_noise_keeps_the_relations_of_the_channels(fitted):
     if system is coupling_by_signal and noise > 3:
         pytest.xfail(f"matched residual windows keep half of a coupling that changes its sign with the signal ({noise:.0f} floors)")
     assert noise <= 3
+
+
+def test_a_channel_of_another_time_is_found_and_nominal_telemetry_is_not(fitted):
+    system, simulator = fitted
+    scorer, window = Scorer(simulator, ScoreOptions(false_alarm_rate=RATE)), simulator.window
+    new, rng = telemetry_of(system, 2, 3 * NUM_SAMPLES), np.random.default_rng(3)
+    assert np.mean(scorer.score_series(new) > 1) <= 0.03  # of a single record of telemetry; thresholds are set for 1 %
+    limit = np.quantile(scorer.score_windows(windows_of(new, window)), 1 - RATE)
+    begins = rng.integers(0, len(new) // 2 - window, NUM_FAULTS)
+    others = begins + PERIOD * rng.integers(20, len(new) // (2 * PERIOD), NUM_FAULTS)
+    faulty = np.stack([new[begin : begin + window] for begin in begins])
+    for number, (other, channel) in enumerate(zip(others, rng.integers(0, 3, NUM_FAULTS), strict=True)):
+        faulty[number, :, channel] = new[other : other + window, channel]
+    recall = np.mean(scorer.score_windows(faulty) > limit)
+    assert recall >= 0.9 if system in (static_mixing, delayed_coupling) else recall > 3 * RATE  # more than models of single channels find
