@@ -11,9 +11,11 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import filelock
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from enhsim_tf.common.atomic_files import sha256, write_json
 from enhsim_tf.common.errors import InputError
@@ -21,9 +23,6 @@ from enhsim_tf.common.size_limits import read_json
 from enhsim_tf.datasets.mix import MOST_WINDOWS
 from enhsim_tf.datasets.plan import FORMAT, MOST_VALUES, Plan
 from enhsim_tf.datasets.shard import Record, shard_file, shard_schema
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of Parquet folders skip such names
 _SHARD = re.compile(r"shard-(\d{6,})\.parquet")
@@ -179,10 +178,7 @@ def find_problems(folder: str | os.PathLike) -> Iterator[str]:
             yield f"{path.name}: not a file of this data set"
 
 
-def _problem_of(folder: Path, record: Record, schema: "pa.Schema") -> str | None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
+def _problem_of(folder: Path, record: Record, schema: pa.Schema) -> str | None:
     path = folder / shard_file(record.shard)
     if not path.is_file():
         return "missing"
