@@ -20,22 +20,9 @@ MAX_COLUMNS = 10_000  # of a table or an array; each column becomes a channel
 _SMALL_TABLE_VALUES = 2_000_000  # a table with fewer values is accepted, however small its file is
 _MAX_VALUES_PER_BYTE = 100  # a larger table may hold this many values for each byte of its file
 _SMALL_TEXT_BYTES = 2**28  # text that needs less memory is accepted, however small its file is
-READ_ERRORS = (  # exceptions raised for damaged headers and archives
-    OSError,
-    ValueError,
-    TypeError,
-    LookupError,
-    AttributeError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    SyntaxError,
-    RuntimeError,  # with RecursionError and NotImplementedError
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-)
+_DAMAGED = (tokenize.TokenError, zipfile.BadZipFile, zlib.error, struct.error, EOFError, SyntaxError, OverflowError)
+READ_ERRORS = (OSError, ValueError, TypeError, LookupError, AttributeError, MemoryError, RuntimeError, *_DAMAGED)
+"""Exceptions raised for damaged headers and archives; RuntimeError includes RecursionError and NotImplementedError."""
 
 
 def load_npy(path: str | os.PathLike) -> np.ndarray:

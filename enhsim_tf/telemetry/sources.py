@@ -107,10 +107,6 @@ def _read_influx(source: str, columns: list[str] | None, time: str | None) -> di
 
 def _read_folder(folder: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
     """Reads the tables in a folder, or the series of a `ParquetStore`."""
-    if (folder / "labeled_anomalies.csv").is_file():
-        raise InputError(
-            f"Expected a store's folder. Received: {folder}, which holds labelled channels. Name one array, such as train/T-1.npy, and column 0."
-        )
     if files_of(folder):  # a store has only folders inside
         return read_table_channels(folder, columns, time, options)
     if time is not None:

@@ -12,6 +12,7 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
+from enhsim_tf.telemetry.windows import runs_of
 
 _ALIKE = (0.8, 1.25)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
 _RUN = 4  # smallest number of consecutive steps that form a stretch with another rate
@@ -142,10 +143,7 @@ def _refined(times: np.ndarray, interval: float) -> float:
 
 
 def _longest_run(marks: np.ndarray) -> tuple[int, int]:
-    """Start and end index (exclusive) of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], marks.view(np.int8), [0]]))).reshape(-1, 2)
-    first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])] if len(edges) else (0, 0)
-    return int(first), int(last)
+    return max(runs_of(marks), key=lambda run: run[1] - run[0], default=(0, 0))
 
 
 def regular_step_fraction(times: np.ndarray, interval: float) -> float:

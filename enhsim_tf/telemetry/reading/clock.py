@@ -3,9 +3,9 @@
 Dates win, then durations, then numbers that increase and whose name speaks of time. Numbers that only look like a clock are never taken.
 """
 
-import dataclasses
 import re
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -47,14 +47,8 @@ _PARTS = {
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Clock:
-    """The clock of a table.
-
-    Args:
-        columns: Columns that make it up; none if samples are counted.
-        cells: Their content, one cell per row, to be parsed as times.
-    """
+class Clock(NamedTuple):
+    """The clock of a table: the columns that make it up, none if samples are counted, and one cell per row, to be parsed as times."""
 
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
