@@ -57,13 +57,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:
-    """Returns the settings of reading and cleaning given by the options of a command that reads telemetry or runs.
-
-    Args:
-        options: Parsed options.
-        min_part: Minimum length of a part in samples.
-        labelled: Treatment of rows that are labelled anomalous.
-    """
+    """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
     bad = "drop" if options.drop_bad else "refuse"
     same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill".split()
     return Cleaning(

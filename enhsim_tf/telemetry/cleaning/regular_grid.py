@@ -21,17 +21,11 @@ _LEAST_REGULAR = 0.4  # share of the steps that are whole numbers of intervals; 
 
 @dataclasses.dataclass
 class Rows:
-    """The rows that are still in use, in chronological order. All arrays have the shape `(rows,)`.
+    """The rows that are still in use, in chronological order. All arrays have the shape `(rows,)`."""
 
-    Args:
-        times: Times in nanoseconds, int64.
-        values: Values, float64; a missing value is NaN or infinite.
-        source_row: Number of the row in the source.
-    """
-
-    times: np.ndarray
-    values: np.ndarray
-    source_row: np.ndarray
+    times: np.ndarray  # int64 nanoseconds
+    values: np.ndarray  # float64; a missing value is NaN or infinite
+    source_row: np.ndarray  # number of the row in the source
 
     def __len__(self) -> int:
         return len(self.times)
@@ -43,17 +37,11 @@ class Rows:
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """Regular samples without a gap.
+    """Regular samples without a gap. Both arrays have the shape `(samples,)`."""
 
-    Args:
-        begin: Time of the first sample in nanoseconds, a float because the grid need not lie on whole nanoseconds.
-        values: float64 array of shape `(samples,)`.
-        source_row: For each sample, its row in the source. A filled sample has the number of the last row before it.
-    """
-
-    begin: float
-    values: np.ndarray
-    source_row: np.ndarray
+    begin: float  # time of the first sample in nanoseconds, which need not be whole ones
+    values: np.ndarray  # float64
+    source_row: np.ndarray  # row of each sample in the source; of a filled one, the last row before it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,10 +107,7 @@ def find_interval(times: np.ndarray) -> float:
 
 
 def _refined(times: np.ndarray, interval: float) -> float:
-    """Refines the interval on the longest run without long gaps.
-
-    The result is the step that at least 90 % of the rows have, or otherwise the slope of a line fitted to the times.
-    """
+    """Refines the interval on the longest run without long gaps: the step that 90 % of the rows have, or the slope of a fitted line."""
     steps = np.diff(times).astype(np.float64)
     numbers = np.round(steps / interval)
     near = (numbers >= 1) & (numbers <= 3)

@@ -31,23 +31,14 @@ _TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Layout:
-    """What the columns of a table are.
-
-    Args:
-        clock: The clock.
-        times: Its times; None if samples are counted.
-        channels: Columns of telemetry.
-        labels: Columns that label anomalous rows.
-        words: Columns of words, which may tell several series apart.
-        left_out: Names of the other columns by the kind of finding that reports them.
-    """
+    """What the columns of a table are."""
 
     clock: Clock
-    times: Times | None
+    times: Times | None  # of the clock; None if samples are counted
     channels: tuple[str, ...]
-    labels: tuple[str, ...]
-    words: tuple[str, ...]
-    left_out: Mapping[str, Sequence[str]]
+    labels: tuple[str, ...]  # which mark anomalous rows
+    words: tuple[str, ...]  # which may tell several series apart
+    left_out: Mapping[str, Sequence[str]]  # the other columns by the kind of finding that reports them
 
 
 def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Layout:

@@ -21,21 +21,13 @@ _ANNOTATION = re.compile(r"^#(?:group|datatype|default)\b", re.MULTILINE)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table:
-    """A table.
+    """A table as it was read."""
 
-    Args:
-        frame: The cells; columns have names of text, which may repeat.
-        places: Where the rows are in their files.
-        decimal: Decimal sign of numbers in text; None: each column shows its own.
-        findings: Findings for the cleaning log.
-        units: Cells of a line of units by the names of the columns.
-    """
-
-    frame: pd.DataFrame
-    places: Places = ROWS
-    decimal: str | None = None
-    findings: tuple[Finding, ...] = ()
-    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    frame: pd.DataFrame  # columns have names of text, which may repeat
+    places: Places = ROWS  # where the rows are in their files
+    decimal: str | None = None  # sign of numbers in text; None: each column shows its own
+    findings: tuple[Finding, ...] = ()  # for the cleaning log
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)  # cells of a line of units by column
 
 
 def table_of(frame: pd.DataFrame, dialect: Dialect, name: str, decimal: str | None, findings: Sequence[Finding]) -> Table:
