@@ -27,19 +27,12 @@ _SHOWN = 3  # number of series listed in a message
 
 @dataclasses.dataclass(frozen=True)
 class InfluxLocation:
-    """Location of a series, or of a store with several series, in InfluxDB.
-
-    Args:
-        bucket: Name of the bucket.
-        measurement: Name of the measurement.
-        field: Name of the field.
-        tags: Pairs of tag and value that all points of the location have.
-    """
+    """Location of a series, or of a store with several series, in InfluxDB."""
 
     bucket: str
     measurement: str
     field: str
-    tags: tuple[tuple[str, str], ...] = ()
+    tags: tuple[tuple[str, str], ...] = ()  # pairs of tag and value that all points of the location have
 
     def __str__(self) -> str:
         path = "/".join(map(_encode, (self.bucket, self.measurement, self.field)))
@@ -49,12 +42,6 @@ class InfluxLocation:
 
 def parse_location(text: str) -> InfluxLocation:
     """Parses `influxdb://bucket/measurement/field?tag=value&...`, with `/`, `?`, `&`, `=` and `%` percent-encoded in names.
-
-    Args:
-        text: The location as text.
-
-    Returns:
-        The location.
 
     Raises:
         InputError: If the text does not have this form.

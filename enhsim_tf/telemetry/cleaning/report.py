@@ -57,25 +57,15 @@ ROWS = Places()
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """One entry of the cleaning log.
+    """One entry of the cleaning log."""
 
-    Args:
-        kind: One of `KINDS`.
-        count: Number of rows, samples, gaps or stretches, as `text` says.
-        text: What was found and what was done about it.
-        places: The first few places where it was found.
-        rows_left_out: Number of rows that are not represented by a sample.
-        samples_filled: Number of samples that do not represent a row.
-        details: Further numbers, in plain JSON types.
-    """
-
-    kind: str
-    count: int
-    text: str
-    places: tuple[str, ...] = ()
-    rows_left_out: int = 0
-    samples_filled: int = 0
-    details: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    kind: str  # one of `KINDS`
+    count: int  # of rows, samples, gaps or stretches, as `text` says
+    text: str  # what was found and what was done about it
+    places: tuple[str, ...] = ()  # the first few where it was found
+    rows_left_out: int = 0  # rows that are not represented by a sample
+    samples_filled: int = 0  # samples that do not represent a row
+    details: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # further numbers, in plain JSON types
 
     @property
     def action(self) -> str:
@@ -99,25 +89,15 @@ def finding_from_dict(content: Mapping[str, Any]) -> Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """The report of cleaning one channel.
-
-    Args:
-        channel: Name of the channel.
-        rows_in: Number of rows in the source.
-        rows_used: Number of rows that are represented by a sample of the result.
-        samples: Number of samples in the result, over all parts.
-        num_parts: Number of parts.
-        interval_s: Sampling interval of the result in seconds, or in samples if the source has no times.
-        findings: The entries of the cleaning log.
-    """
+    """The report of cleaning one channel."""
 
     channel: str
-    rows_in: int
-    rows_used: int
-    samples: int
+    rows_in: int  # rows in the source
+    rows_used: int  # rows that are represented by a sample of the result
+    samples: int  # samples in the result, over all parts
     num_parts: int
-    interval_s: float
-    findings: tuple[Finding, ...]
+    interval_s: float  # sampling interval of the result in seconds, or in samples if the source has no times
+    findings: tuple[Finding, ...]  # the entries of the cleaning log
 
     @property
     def rows_left_out(self) -> int:
