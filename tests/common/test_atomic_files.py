@@ -179,13 +179,6 @@ for number in range(50):
     assert len(set(content_of(tmp_path).values())) == 1 and names_in(tmp_path) == ["model"]
 
 
-def test_the_longest_name_still_allows_two_temporary_suffixes(tmp_path):
-    path = tmp_path / atomic_files.encode_name("a" * 160)
-    with replace_folder(path) as outer, replace_folder(outer) as inner, replace_file(inner / "settings.json") as temporary:
-        temporary.write_text("{}")
-    assert (path / "settings.json").read_text() == "{}"
-
-
 def test_json_without_nan_and_its_checksum(tmp_path):
     path = tmp_path / "results.json"
     atomic_files.write_json(path, {"a": [1, 2.5, None, "é"]})

@@ -1,7 +1,6 @@
 """Large data sets: identical bytes after any interruption, detection of damage, and reading of the files."""
 
 import errno
-import importlib.metadata
 import itertools
 import json
 import os
@@ -253,13 +252,6 @@ def test_a_data_set_with_other_settings_is_left_unchanged(other, words, finished
     with refused(*words, "--out"):
         generate_data_set(folder, other)
     assert content_of(folder) == before and not here
-
-
-def test_a_run_with_other_library_versions_does_not_resume(undisturbed, tmp_path, here, monkeypatch, refused):
-    folder, known = begun(tmp_path / "set", undisturbed), importlib.metadata.version
-    monkeypatch.setattr(importlib.metadata, "version", lambda name: "9.9" if name == "numpy" else known(name))
-    with refused("versions", "9.9"):
-        generate_data_set(folder, plan())
 
 
 @pytest.mark.parametrize("name", ["notes.txt", "shard-000000.parquet", "training.parquet", "folder"])
