@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from enhsim_tf.coarse_simulator.recording import Recording
     from enhsim_tf.telemetry.cleaning.clean import Cleaned
 
-THREADS = 1  # of a worker
-
 
 @dataclasses.dataclass(frozen=True)
 class CoarseRun:
@@ -143,7 +141,7 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
         some, workers = batches.pop()
         waiting = {job.name: job for job in some}
         try:
-            with contextlib.closing(engines.run(engine, fit_or_say, some, workers, THREADS)) as running:
+            with contextlib.closing(engines.run(engine, fit_or_say, some, workers)) as running:
                 for outcome in running:
                     del waiting[outcome.name]
                     yield outcome

@@ -60,12 +60,9 @@ class InfluxServer:
         return InfluxServer, (self.bucket, self.max_retry_s)  # a copy opens its own connection, so the token is not pickled
 
     def send(self, lines: str) -> None:
-        """Writes points. The request can be repeated safely, because writing a point twice stores it once.
+        """Writes points in line protocol, with times in nanoseconds. It can be repeated, as a point that is written twice is stored once.
 
         The client's own writer of data frames is not used: it evaluates the names of tags as code.
-
-        Args:
-            lines: Points in line protocol, with times in nanoseconds.
         """
         self._repeat(lambda: self._client.write_api(SYNCHRONOUS).write(self.bucket, record=lines.encode(), write_precision="ns"))
 
@@ -86,16 +83,10 @@ class InfluxServer:
     def stream(self, wanted: Mapping[str, str]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Streams the points of one series in chronological order, block by block, so that memory does not grow with their number.
 
-        If the connection breaks, the query is repeated from the point after the last one received.
-
-        Args:
-            wanted: Values of the columns that select the series among the points of the bucket.
+        If the connection breaks, the query is repeated from the point after the last one received; see `points` for `wanted`.
 
         Yields:
             Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
-
-        Raises:
-            InputError: If the server does not answer, the connection keeps breaking, or the values are not numbers.
         """
         start_ns, moved = _FIRST_NS, time.monotonic()
         while True:
