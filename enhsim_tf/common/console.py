@@ -4,15 +4,11 @@ import argparse
 import math
 import os
 import sys
-import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import NoReturn
 
 from enhsim_tf.common.errors import InputError, printable
-
-if TYPE_CHECKING:
-    from tqdm import tqdm
 
 
 class Parser(argparse.ArgumentParser):
@@ -33,19 +29,11 @@ def tell(line: str) -> None:
     print(f"{text}\n", end="", flush=True)  # text and line break in one write, since other processes may print at the same time
 
 
-def progress(*arguments: Any, **options: Any) -> "tqdm":
-    """Creates a `tqdm` progress bar whose lock is of this process: of a shared one, Python warns when a worker is terminated."""
-    from tqdm import tqdm
-
-    tqdm.set_lock(threading.RLock())
-    return tqdm(*arguments, **options)
-
-
-INTERVAL_S = 15.0  # without a terminal, seconds between two progress lines
+INTERVAL_S = 15.0  # seconds between two progress lines
 
 
 class Progress:
-    """Reports the progress of long work as text lines, for output that cannot show progress bars.
+    """Reports the progress of long work as text lines.
 
     Args:
         tell: Called with each line. None: no lines are printed.

@@ -26,12 +26,6 @@ def test_a_line_is_printed_at_once_in_the_characters_of_the_encoding(encoding, p
     assert (ended.stdout.decode(encoding), ended.stderr) == (printed, b"")
 
 
-def test_a_progress_bar_of_a_terminated_process_causes_no_semaphore_warning():
-    script = "import os\nfrom enhsim_tf.common.console import progress\nfor _ in progress(range(3), disable=True): pass\nos._exit(0)"
-    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
-    assert (ended.stdout, ended.stderr) == ("", "")
-
-
 # -- progress --------------------------------------------------------------------------------------------------------------
 
 

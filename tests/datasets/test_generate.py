@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.__main__ import main
+from enhsim_tf.common import console
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.datasets import generate
 from enhsim_tf.datasets.folder import find_problems, locked
@@ -141,6 +142,11 @@ def test_a_run_resumes_after_the_finished_shards(tail, undisturbed, tmp_path, he
     told(folder, plan())
     assert here == [shard for shard in range(20) if shard not in (0, 1, 2, 5)]
     assert content_of(folder) == content_of(undisturbed)
+
+
+def test_a_long_run_says_how_far_it_is(tmp_path, monkeypatch, here):
+    monkeypatch.setattr(console, "INTERVAL_S", 0.0)
+    assert any(line.startswith("window 500 of 1,000, 50 %, about ") for line in told(tmp_path / "set", plan()))
 
 
 def test_a_journal_continues_after_an_incomplete_line(undisturbed, tmp_path, monkeypatch, here):
