@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from enhsim_tf.cli.options import channels_by_model, cleaned_channels, cleaning_options, for_each, run_for
-from enhsim_tf.common.atomic_files import make_folder, replace_folder, write_json
+from enhsim_tf.common.atomic_files import replace_folder, write_json
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.simulator.model_folder import folder_of, models_of, refuse_foreign
@@ -41,7 +41,6 @@ def run_update(options: argparse.Namespace) -> int:
         simulator = EnhancedSimulator.load(models[model])
         run = run_for(simulator, options, cleaning)
         updated, report = update(simulator, telemetry, run, options.held_out, options.seed)
-        make_folder(out)
         kept = {"update": report.to_dict(), "cleaning": {name: each.report.to_dict() for name, each in cleaned.items()}}
         with replace_folder(folders[model]) as temporary:
             updated.save(temporary)

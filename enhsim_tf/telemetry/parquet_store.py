@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.common.atomic_files import encode_name, make_folder, replace_folder
+from enhsim_tf.common.atomic_files import encode_name, replace_folder
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import check_parquet, short_reason
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
@@ -45,7 +45,6 @@ class ParquetStore:
         if others or channel.is_file():
             what = f"which holds {others[0]!r}" if others else "a file"
             raise InputError(f"Expected a place for the series. Received: {channel}, {what}. Name another folder for the store.")
-        make_folder(self.folder)
         times = nanoseconds(telemetry)
         described = {"name": telemetry.name, "unit": telemetry.unit, "start": telemetry.start or ""}
         described |= {key: repr(getattr(telemetry, key)) for key in ("interval_s", "offset_s")}

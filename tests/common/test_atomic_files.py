@@ -54,16 +54,6 @@ def test_a_folder_is_made_with_its_parents_and_refused_in_place_of_a_file(tmp_pa
     assert content_of(folder) == {"taken": "x"}
 
 
-def test_replace_file_renames_only_at_the_end(tmp_path):
-    path = tmp_path / "values.json"
-    path.write_text("old")
-    with replace_file(path) as temporary:
-        temporary.write_text("new")
-        assert path.read_text() == "old"
-        assert temporary.parent == path.parent and temporary.suffix == ".json"
-    assert content_of(tmp_path) == {"values.json": "new"}
-
-
 @pytest.mark.parametrize("before", ["nothing", "a folder", "a file", "a link"])
 def test_replace_folder_replaces_whatever_is_there(tmp_path, before):
     path = tmp_path / "above" / "model"

@@ -87,17 +87,6 @@ def change_manifest(folder, change):
 # what is written
 
 
-def test_the_manifest_contains_settings_and_records(undisturbed):
-    manifest = json.loads((undisturbed / "_manifest.json").read_text())
-    assert sorted(content_of(undisturbed)) == sorted([".lock", "_manifest.json", *(shard_file(shard) for shard in range(20))])
-    assert manifest["format"] == "enhsim_tf.datasets.generate/3"
-    assert manifest["settings"]["seed"] == 3 and manifest["settings"]["window"] == 60
-    assert manifest["settings"]["models"] == [{"name": "model-0", "share": 1.0, "sha256": "0" * 64}]
-    assert [shard["rows"] for shard in manifest["shards"]] == [50] * 20
-    for shard in manifest["shards"]:
-        assert sha256(undisturbed / shard["file"]) == shard["sha256"]
-
-
 def flip(path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
