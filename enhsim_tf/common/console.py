@@ -36,19 +36,18 @@ class Progress:
     """Reports the progress of long work as text lines.
 
     Args:
-        tell: Called with each line. None: no lines are printed.
+        tell: Called with each line.
         before: Prefix of each line, such as the name of the work.
         clock: Monotonic clock in seconds.
     """
 
-    def __init__(self, tell: Callable[[str], None] | None = None, before: str = "", clock: Callable[[], float] = time.monotonic):
+    def __init__(self, tell: Callable[[str], None], before: str = "", clock: Callable[[], float] = time.monotonic):
         self.tell, self.before, self.clock, self.last_line_s = tell, before, clock, clock()
 
     def step(self, what: str) -> None:
         """Says at once what begins, such as `noise`."""
-        if self.tell is not None:
-            self.last_line_s = self.clock()
-            self.tell(f"{self.before}{what} ...")
+        self.last_line_s = self.clock()
+        self.tell(f"{self.before}{what} ...")
 
     def loop(self, unit: str, total: int) -> Callable[[float], None]:
         """Starts to report a loop, by a line when `INTERVAL_S` seconds have passed since the last one.
@@ -65,7 +64,7 @@ class Progress:
         first: list[float] = []  # time at which the first step ended, and units finished by then
 
         def told(done: float) -> None:
-            if self.tell is None or not 0 < done < total:
+            if not 0 < done < total:
                 return
             now = self.clock()
             if not first:
@@ -81,7 +80,7 @@ class Progress:
         return told
 
 
-SILENT = Progress()
+SILENT = Progress(lambda line: None)
 
 
 def _time_left(seconds: float) -> str:

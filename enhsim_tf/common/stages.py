@@ -83,7 +83,7 @@ class Stages:
         began, outer = time.perf_counter(), self.progress
         # if two runs make the same stage, the first result is kept, because the other run may read it
         with replace_folder(folder, keep=lambda path: not self.fresh and _read(path) is not None) as temporary:
-            self.progress = Progress(self.tell if self.speaks else None, f"{name:12} ")
+            self.progress = Progress(self.tell, f"{name:12} ") if self.speaks else SILENT
             try:
                 make(temporary)
             finally:
