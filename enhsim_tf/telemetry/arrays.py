@@ -33,9 +33,10 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None,
         raise InputError(
             f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
         ) from None
-    if array.ndim not in (1, 2) or array.dtype.names:
-        shape = "fields" if array.dtype.names else array.shape
-        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    if array.ndim not in (1, 2):
+        raise InputError(
+            f"Expected an array of shape (samples,) or (samples, columns). Received: {array.shape} in {path.name}. Reshape it."
+        )
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
     if columns is None and array.shape[1] > MAX_COLUMNS:
         raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")

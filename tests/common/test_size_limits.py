@@ -26,9 +26,7 @@ def npy(path, descr, shape, content=b""):
     return path
 
 
-@pytest.mark.parametrize(
-    "array", [np.arange(6.0), np.asfortranarray(np.arange(6).reshape(2, 3)), np.zeros(0), np.array(["a", "ß"]), np.array(1)]
-)
+@pytest.mark.parametrize("array", [np.arange(6.0), np.asfortranarray(np.arange(6).reshape(2, 3)), np.zeros(0), np.array(1)])
 def test_an_array_is_read_as_it_was_written(tmp_path, array):
     np.save(tmp_path / "x.npy", array)
     found = load_npy(tmp_path / "x.npy")
@@ -45,9 +43,10 @@ def test_an_array_is_read_as_it_was_written(tmp_path, array):
         ("<f8", (61,), "greater than file"),
         ("<f8", (10**30,), "too large"),
         ("<f8", (-1,), "negative"),
-        ("|S0", (10**12,), "no size"),
+        ("|S0", (10**12,), "no numbers"),
         ("|O", (60,), "objects"),
-        ("<U2", (60,), "Unicode"),
+        ("<U2", (60,), "no numbers"),
+        ([("a", "<f8")], (60,), "no numbers"),
     ],
 )
 def test_an_array_with_a_wrong_header_is_refused(tmp_path, descr, shape, word):
