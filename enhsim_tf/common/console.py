@@ -33,13 +33,7 @@ INTERVAL_S = 15.0  # seconds between two progress lines
 
 
 class Progress:
-    """Reports the progress of long work as text lines.
-
-    Args:
-        tell: Called with each line.
-        before: Prefix of each line, such as the name of the work.
-        clock: Monotonic clock in seconds.
-    """
+    """Reports the progress of long work as lines of text, with which `tell` is called; each begins with `before`."""
 
     def __init__(self, tell: Callable[[str], None], before: str = "", clock: Callable[[], float] = time.monotonic):
         self.tell, self.before, self.clock, self.last_line_s = tell, before, clock, clock()
@@ -54,12 +48,8 @@ class Progress:
 
         The remaining time is extrapolated from all steps except the first, which also builds the network's graph.
 
-        Args:
-            unit: What the loop counts, such as `epoch`.
-            total: Number of units in the loop.
-
         Returns:
-            A function to be called with the number of finished units, which may be fractional.
+            A function to be called with the number of finished units, such as epochs, which may be fractional.
         """
         first: list[float] = []  # time at which the first step ended, and units finished by then
 
@@ -90,11 +80,7 @@ def _time_left(seconds: float) -> str:
 
 
 def run_command(run: Callable[[], int], interrupted: str) -> int:
-    """Runs a command and prints its error as one line.
-
-    Args:
-        run: The command, a function that returns the exit code.
-        interrupted: Message printed after an interrupt.
+    """Runs a command, a function that returns the exit code, and prints its error as one line, or the words for an interrupt.
 
     Returns:
         The exit code: 2 for a user's mistake and for errors of files or memory; as in shells, 130 for an interrupt and 141 for a

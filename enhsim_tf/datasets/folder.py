@@ -33,12 +33,7 @@ _LONGEST_LINE = 1_000  # maximum bytes of a journal line; longer lines are read 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Creates a folder and locks it against other runs. The operating system releases the lock when this process ends for any reason.
-
-    Raises:
-        InputError: If another run has locked the folder.
-        OSError: If the folder is not writable.
-    """
+    """Creates a folder and locks it against other runs. The operating system releases the lock when this process ends for any reason."""
     folder.mkdir(parents=True, exist_ok=True)
     open(folder / _LOCK, "ab").close()  # no probe beside it: another run may be looking at what is there
     lock = filelock.FileLock(folder / _LOCK, blocking=False, preserve_lock_file=True)  # or where there are no locks, a mark that stays

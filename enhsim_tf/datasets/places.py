@@ -77,12 +77,7 @@ class Place:
     length: str
 
     def samples(self, index: pd.Index, interval_s: float) -> tuple[int, int]:
-        """Returns the first sample and the number of samples.
-
-        Args:
-            index: Index of the series: times in UTC, or anything else for a series without times.
-            interval_s: Sampling interval in seconds.
-        """
+        """Returns the first sample and the number of samples; the index of the series has times in UTC, or is that of one without times."""
         length = parse_num_samples(self.length, interval_s)
         if self.begin.isdecimal():
             return int(self.begin[:12]), length
@@ -99,12 +94,7 @@ class Place:
 
 
 def parse_place(text: str, severity: float | None = None) -> Place:
-    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`, such as `ramp:4@5000/200` or `stuck:1@2024-01-05T12:00/2h`. The kind is not checked.
-
-    Args:
-        text: The place.
-        severity: What a place without a severity gets.
-    """
+    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`, such as `ramp:4@5000/200` or `stuck:1@2024-01-05T12:00/2h`. The kind is not checked."""
     found = _PLACE.fullmatch(text)
     try:
         if not found:

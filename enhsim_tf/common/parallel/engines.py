@@ -43,14 +43,7 @@ def _check_workers(engine: str, workers: int | None) -> None:
 
 
 def parse_workers(text: str | None, engine: str | None = None) -> int | None:
-    """Parses the option `--workers auto|N`, for the engine `local` if none is given.
-
-    Returns:
-        The number of workers, or None for one per CPU.
-
-    Raises:
-        InputError: If the value is neither `auto` nor a positive integer, or if they are too many for the engine.
-    """
+    """Parses the option `--workers auto|N`, for the engine `local` if none is given: a number, or None for one per CPU."""
     if text in (None, "auto"):
         return None
     if not (text.isascii() and text.isdecimal() and 1 <= len(text) <= 9 and int(text)):

@@ -55,14 +55,7 @@ class _Segment:
 
 
 def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> tuple[list[Part], int, float]:
-    """Turns rows into regular parts.
-
-    Args:
-        rows: The rows.
-        bad: Mask of the source rows whose value cannot be read.
-        log: The cleaning log. If it has no times, samples are counted.
-        name: Channel name, for messages.
-        options: How problems are treated.
+    """Turns rows into regular parts; `bad` marks the source rows whose value cannot be read.
 
     Returns:
         The parts, the number of rows that their samples represent, and the interval in nanoseconds.

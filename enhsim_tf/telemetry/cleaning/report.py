@@ -145,11 +145,7 @@ def lines_of(reports: Sequence[Report]) -> list[str]:
 class CleaningLog:
     """The log of cleaning actions: collects findings with their places in the source.
 
-    Args:
-        times: Times of all rows in the order of the source, int64 nanoseconds since 1970. None: the source has no times.
-        findings: Findings made when the source was read.
-        places: Where the rows are in their files.
-        counts: Whether the times count from a zero of their own and are no dates.
+    `times` are those of all rows in the order of the source, int64 nanoseconds since 1970, or None; `counts` as in `times.Times`.
     """
 
     def __init__(self, times: np.ndarray | None, findings: Sequence[Finding] = (), places: Places = ROWS, counts: bool = False):
@@ -164,14 +160,9 @@ class CleaningLog:
         return f"{self.places.of(row)}, {time}"
 
     def add(self, kind: str, rows: Sequence[int] | np.ndarray, text: str, count: int | None = None, **numbers: Any) -> None:
-        """Adds a finding, unless its count is 0.
+        """Adds a finding made at rows of the source, unless its count, by default the number of these rows, is 0.
 
-        Args:
-            kind: One of `KINDS`.
-            rows: Rows of the source where it was found. The first few are named.
-            text: What was found and what was done; `{count}` in it becomes the count.
-            count: The count. None: the number of `rows`.
-            **numbers: The other fields of the `Finding`.
+        `{count}` in the text becomes the count; `numbers` are the other fields of the `Finding`.
         """
         count = len(rows) if count is None else count
         if count:

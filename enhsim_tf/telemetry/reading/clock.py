@@ -100,11 +100,7 @@ def _is_epoch(values: np.ndarray) -> bool:
 def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str) -> Clock:
     """Finds the clock of a table; refuses one in which several columns may be it, or one of which only the values speak for it.
 
-    Args:
-        frame: The table.
-        kinds: Kind of each column, such as "numbers", "dates", "words".
-        numbers: Values of the columns of numbers that are not asked for as channels.
-        what: Description of the source, for messages.
+    `kinds` are those of `columns.lay_out`; `numbers` are the values of the columns of numbers that are not asked for as channels.
     """
     tells = {name: _name_tells(name)[0] for name in kinds}
     of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "times of day", "spans")}

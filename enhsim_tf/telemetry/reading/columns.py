@@ -42,14 +42,9 @@ class Layout:
 
 
 def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Layout:
-    """Says what each column of a table is; raises an `InputError` if the clock cannot be told.
+    """Says what each column of a table, in which no name repeats, is; raises an `InputError` if the clock cannot be told.
 
-    Args:
-        table: The table; no name repeats.
-        columns: Columns that were asked for as channels, or None.
-        time: Name of the time column, `NO_TIME`, or None.
-        options: How columns and times are read.
-        what: Description of the source, for messages.
+    `columns` are those that were asked for as channels, and `time` is the name of the time column or `NO_TIME`.
     """
     frame, asked = table.frame, {*(columns or ()), *(options.value_column or ())}
     kinds = {name: _kind_of(frame[name]) for name in frame.columns}
