@@ -1,10 +1,9 @@
 """Cached stages: each result is stored under a hash of what it depends on and reused by the next run.
 
-A stage is a function that fills a folder. The folder is moved into place when it is complete. Its name contains a hash of the stage's
-settings, of its version, of the stages before it, and of the versions of packages. A person raises the version when changed code changes
-the result; code that was moved or renamed finds its results again. An interrupted run leaves only complete stages; the next run continues
-after the last one and removes incomplete ones. `stage.json` holds the checksums of the files: a stage that was damaged since is reported
-and run again.
+A stage is a function that fills a folder, which is moved into place when it is complete. Its name contains a hash of the stage's settings
+and version, of the stages before it, and of the versions of packages. A person raises the version when changed code changes the result.
+An interrupted run leaves only complete stages, after which the next one continues. `stage.json` holds the checksums of the files: a stage
+that was damaged since is reported and run again.
 """
 
 import hashlib

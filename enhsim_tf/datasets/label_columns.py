@@ -34,12 +34,8 @@ def series_table(
 ) -> pd.DataFrame:
     """Makes the labelled table of a series. A sample that was not changed is labelled nominal, also within an event.
 
-    Args:
-        values: float32 of shape `(samples, channels)`.
-        masks: Which samples were changed, same shape.
-        channels: Names of the channels.
-        events: Name, severity, onset and end of each event, in the order of time and without overlaps.
-        index: Index of the table.
+    `values` are float32 of shape `(samples, channels)`, and `masks` mark the changed samples. `events` are name, severity, onset and end of
+    each, in the order of time and without overlaps.
     """
     mask, is_joint = masks.any(axis=1), len(channels) > 1
     names = list(dict.fromkeys([NOMINAL, *(name for name, *_ in events)]))
@@ -65,12 +61,8 @@ def window_table(
 ) -> pa.Table:
     """Makes the labelled table of windows. A window in which no sample was changed is labelled nominal, with the severity 0.
 
-    Args:
-        windows: float32 of shape `(windows, samples, channels)`.
-        masks: Which samples were changed, same shape.
-        channels: Names of the channels.
-        names: Scenario of each window, which may be nominal.
-        severities: Severity of the scenario of each window.
+    `windows` are float32 of shape `(windows, samples, channels)`, and `masks` mark the changed samples. `names` and `severities` are the
+    scenario of each window, which may be nominal.
     """
 
     def lists(values: np.ndarray) -> pa.Array:

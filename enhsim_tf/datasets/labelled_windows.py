@@ -47,11 +47,6 @@ def write_windows_labelled(path: str | os.PathLike, simulator: EnhancedSimulator
 
     A window that its scenario has not changed, such as one in which the mechanism would have stood still anyway, is labelled nominal.
 
-    Args:
-        path: Path of the file.
-        simulator: The simulator.
-        shares: The scenarios and their numbers of windows.
-
     Returns:
         For each scenario, the number of its windows that are labelled nominal because it has changed no sample of them.
     """

@@ -35,13 +35,7 @@ _TIMEOUT_MS = 60_000  # timeout of a request if INFLUXDB_V2_TIMEOUT is not set; 
 class InfluxServer:
     """One bucket of the server that `INFLUXDB_V2_URL`, `INFLUXDB_V2_TOKEN` and `INFLUXDB_V2_ORG` name.
 
-    Args:
-        bucket: Name of the bucket.
-        max_retry_s: How long to retry if a server that has answered before stops answering, in seconds. If a server has never
-            answered, there are no retries.
-
-    Raises:
-        InputError: If a variable is missing or cannot be used.
+    A server that has answered before and stops is asked again for `max_retry_s` seconds; one that has never answered is not.
     """
 
     def __init__(self, bucket: str, max_retry_s: float = 60.0):
