@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv
 from influxdb_client import Dialect, InfluxDBClient
 from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
 from influxdb_client.client.write_api import SYNCHRONOUS
@@ -155,9 +157,6 @@ def _check_variables() -> tuple[str, str]:
 
 def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Parses the CSV of a response block by block; yields times and values. The client's own parser cuts times to microseconds."""
-    import pyarrow as pa
-    import pyarrow.csv
-
     answer.auto_close = False  # Arrow asks whether it is closed after its end
     types = {"_time": pa.timestamp("ns", "UTC"), "_value": pa.float64()}
     convert = pyarrow.csv.ConvertOptions(column_types=types, include_columns=list(types))

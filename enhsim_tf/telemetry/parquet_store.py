@@ -8,6 +8,8 @@ import urllib.parse
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from enhsim_tf.common.atomic_files import encode_name, replace_folder
 from enhsim_tf.common.errors import InputError
@@ -35,9 +37,6 @@ class ParquetStore:
         Raises:
             InputError: If the series has no name or no samples, or its folder holds other files.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         if not telemetry.name or not len(telemetry):
             raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
         channel = self._channel(telemetry.name)
@@ -63,9 +62,6 @@ class ParquetStore:
         Raises:
             InputError: If there is no such series, or if samples are missing from it.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         files = sorted(self._channel(name).glob("*.parquet"))
         if not files:
             raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
