@@ -15,6 +15,7 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
+from enhsim_tf.telemetry.influx_store import InfluxStore
 from enhsim_tf.telemetry.pandas_series import from_series, to_series
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.reading.channels import read_table_channels
@@ -90,8 +91,6 @@ def _exists(path: Path) -> bool:
 
 def _read_influx(source: str, columns: list[str] | None, time: str | None) -> dict[str, pd.Series]:
     """Reads the series written by an `InfluxStore`, or otherwise the one series at the address, named after its field."""
-    from enhsim_tf.telemetry.influx_store import InfluxStore  # the client is an optional extra
-
     if time is not None:
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {source}. Leave it out.")
     store = InfluxStore(source)
