@@ -5,25 +5,22 @@ import functools
 import json
 
 from enhsim_tf.cli.options import cleaning_options, refuse_without, tell_failed
+from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.console import tell
+from enhsim_tf.common.parallel.engines import parse_workers
+from enhsim_tf.simulator.fit_many import fit_channels
+from enhsim_tf.simulator.options import FitOptions, options_from
+from enhsim_tf.telemetry.arrays import read_commands
+from enhsim_tf.telemetry.sources import read_source
 
 
 def run_fit(options: argparse.Namespace) -> int:
     """Fits one simulator to all channels of the source, or one to each, and returns the exit code."""
-    from enhsim_tf.simulator.options import FitOptions, options_from
-
     chosen = options_from(options, FitOptions)
     if options.coarse is None:
         refuse_without(options, "coarse", "coarse_time", "coarse_start", "coarse_column", "delay_s")
-    from enhsim_tf.common.parallel.engines import parse_workers
-
     workers = parse_workers(options.workers, options.engine)
     cleaning = cleaning_options(options, options.window or 32, "missing")
-    from enhsim_tf.coarse_simulator.recording_files import read_recording  # imported here, because pandas is slow to import
-    from enhsim_tf.simulator.fit_many import fit_channels
-    from enhsim_tf.telemetry.arrays import read_commands
-    from enhsim_tf.telemetry.sources import read_source
-
     speaks = not options.json
     say = tell if speaks else lambda line: None
     say("reading ...")

@@ -3,16 +3,25 @@
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from enhsim_tf.cli.options import cleaning_options, counted, for_each, output_paths, refuse_same_file, refuse_without
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
+from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
-
-if TYPE_CHECKING:
-    from enhsim_tf.coarse_simulator.degraded import Degraded
-    from enhsim_tf.datasets.plan import Plan
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.common.parallel.engines import parse_workers
+from enhsim_tf.datasets.generate import generate_data_set
+from enhsim_tf.datasets.label_columns import write_table
+from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
+from enhsim_tf.datasets.labelled_windows import divide_windows, draw_schedule, series_index, series_labelled, write_windows_labelled
+from enhsim_tf.datasets.mix import make_mix, read_mix
+from enhsim_tf.datasets.places import length_limits, parse_length, parse_num_samples, parse_place, parse_scenario, parse_start, split_limits
+from enhsim_tf.datasets.plan import Plan, make_plan
+from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.trusted_range import TrustedRange
 
 _NOT_OF_RUNS = "windows continuous start scenario at number gap timeeval nominal_share workers engine scenarios".split()
 
@@ -35,18 +44,12 @@ def run_generate(options: argparse.Namespace) -> int:
         return _generate_many(options)
     if options.windows is None and options.continuous is None:
         raise InputError("Expected --windows or --continuous. Received: neither.")
-    from enhsim_tf.datasets.places import parse_scenario
-    from enhsim_tf.simulator.model_folder import chosen_of, models_of
-
     scenarios, is_series = [parse_scenario(text) for text in options.scenario], options.continuous is not None
     write = (_series_writer if is_series else _windows_writer)(options, scenarios, options.seed or 0)
     models = chosen_of(models_of(options.models), options.channel)
     paths = output_paths(options.out, models, (".csv",) if options.timeeval else (".parquet", ".csv") if is_series else (".parquet",))
 
     def generate(channel: str) -> None:
-        from enhsim_tf.simulator.simulator import EnhancedSimulator
-        from enhsim_tf.simulator.trusted_range import TrustedRange
-
         simulator = EnhancedSimulator.load(models[channel])
         for line in write(simulator, paths[channel]):
             tell(f"{printable(channel)}: {line}")
@@ -58,17 +61,15 @@ def run_generate(options: argparse.Namespace) -> int:
     return for_each(models, generate)
 
 
-Writer = Callable[["EnhancedSimulator", Path], list[str]]  # writes a file with a simulator and returns what is said of it
+Writer = Callable[[EnhancedSimulator, Path], list[str]]  # writes a file with a simulator and returns what is said of it
 
 
-def _windows_writer(options: argparse.Namespace, scenarios: "Sequence[Degraded]", seed: int) -> Writer:
-    from enhsim_tf.datasets.labelled_windows import divide_windows, write_windows_labelled
-
+def _windows_writer(options: argparse.Namespace, scenarios: Sequence[Degraded], seed: int) -> Writer:
     if options.windows < 1:
         raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
     shares = divide_windows(scenarios, _nominal_share(options), options.windows, seed)
 
-    def write(simulator: "EnhancedSimulator", path: Path) -> list[str]:
+    def write(simulator: EnhancedSimulator, path: Path) -> list[str]:
         unchanged = write_windows_labelled(path, simulator, shares)
         lines = [f"{counted(options.windows, 'window')} of {simulator.window} samples in {path}"]
         for scenario, number in unchanged.items():
@@ -80,14 +81,7 @@ def _windows_writer(options: argparse.Namespace, scenarios: "Sequence[Degraded]"
     return write
 
 
-def _series_writer(options: argparse.Namespace, scenarios: "Sequence[Degraded]", seed: int) -> Writer:
-    import numpy as np
-
-    from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
-    from enhsim_tf.datasets.label_columns import write_table
-    from enhsim_tf.datasets.labelled_windows import draw_schedule, series_index, series_labelled
-    from enhsim_tf.datasets.places import length_limits, parse_length, parse_num_samples, parse_place, parse_start, split_limits
-
+def _series_writer(options: argparse.Namespace, scenarios: Sequence[Degraded], seed: int) -> Writer:
     if options.number is None and (len(scenarios) > 1 or (scenarios and options.at)):
         raise InputError(
             "Expected --number, of events at drawn places, with several --scenario in a series, or with --scenario and --at. Received: none."
@@ -100,7 +94,7 @@ def _series_writer(options: argparse.Namespace, scenarios: "Sequence[Degraded]",
     limits, start = split_limits("length", options.length), None if options.start is None else parse_start(options.start)
     parse_length(options.continuous)
 
-    def write(simulator: "EnhancedSimulator", path: Path) -> list[str]:
+    def write(simulator: EnhancedSimulator, path: Path) -> list[str]:
         interval_s, scenario, schedule = simulator.interval_s, scenarios[0] if scenarios else None, []
         length = parse_num_samples(options.continuous, interval_s)
         if places or options.number:
@@ -131,11 +125,6 @@ def _generate_copies(options: argparse.Namespace) -> int:
                 f"Expected --{word} without --coarse, or --coarse without it. Received: both. The run gives length, times and labels."
             )
     copies = 1 if options.copies is None else options.copies
-    from enhsim_tf.coarse_simulator.recording_files import read_recording
-    from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
-    from enhsim_tf.simulator.model_folder import chosen_of, models_of
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
-
     models = chosen_of(models_of(options.models), options.channel)
     paths = output_paths(options.out, models, (".parquet",))
     refuse_same_file(paths.values(), options.coarse)
@@ -158,22 +147,14 @@ def _generate_copies(options: argparse.Namespace) -> int:
 
 def _generate_many(options: argparse.Namespace) -> int:
     """Generates one large data set per channel, or one from several models. All plans are checked before the first one is made."""
-    from enhsim_tf.common.parallel.engines import parse_workers
-    from enhsim_tf.datasets.generate import generate_data_set
-
     workers = parse_workers(options.workers, options.engine)
     for out, plan in _plans_of(options).items():
         generate_data_set(out, plan, workers, options.engine or "local", tell)
     return 0
 
 
-def _plans_of(options: argparse.Namespace) -> "dict[Path, Plan]":
+def _plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
     """Returns the plan of each data set, by its output folder."""
-    from enhsim_tf.datasets.mix import make_mix, read_mix
-    from enhsim_tf.datasets.places import parse_scenario
-    from enhsim_tf.datasets.plan import make_plan
-    from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
-
     if options.continuous is not None:
         raise InputError("Expected --windows with --workers, --engine or --scenarios. Received: --continuous.")
     if options.scenarios is None:

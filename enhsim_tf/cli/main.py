@@ -1,31 +1,19 @@
 """The entry point of `python -m enhsim_tf`: parses the options and runs the selected command."""
 
 import argparse
+import importlib
 
 from enhsim_tf.cli.arguments import parse
-from enhsim_tf.cli.fit import run_fit
-from enhsim_tf.cli.generate import run_generate
-from enhsim_tf.cli.inject import run_inject
-from enhsim_tf.cli.score import run_score
-from enhsim_tf.cli.update import run_update
-from enhsim_tf.cli.verify import run_verify
 from enhsim_tf.common.console import run_command
 from enhsim_tf.common.errors import InputError
 
 
 def run(options: argparse.Namespace) -> int:
-    """Runs the selected command and returns its exit code."""
+    """Runs the selected command, whose module is imported only now because its imports are slow, and returns its exit code."""
     if options.seed is not None and not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
-    commands = {
-        "fit": run_fit,
-        "generate": run_generate,
-        "verify": run_verify,
-        "score": run_score,
-        "update": run_update,
-        "inject": run_inject,
-    }
-    return commands[options.command](options)
+    module = importlib.import_module(f"enhsim_tf.cli.{options.command}")
+    return getattr(module, f"run_{options.command}")(options)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -5,17 +5,20 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import pandas as pd
+
+from enhsim_tf.coarse_simulator.commands import CommandTraces
+from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.coarse_simulator.recording_files import read_recording
+from enhsim_tf.common.atomic_files import make_folder
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from enhsim_tf.coarse_simulator.recording import Recording
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
-    from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning
+from enhsim_tf.simulator.joint import join_channels
+from enhsim_tf.simulator.model_folder import channels_of, folder_of
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.arrays import read_commands
+from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
@@ -53,16 +56,8 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
 
 
-def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> "Cleaning":
-    """Returns the settings of reading and cleaning given by the options of a command that reads telemetry or runs.
-
-    Args:
-        options: Parsed options.
-        min_part: Minimum length of a part in samples.
-        labelled: Treatment of rows that are labelled anomalous.
-    """
-    from enhsim_tf.telemetry.cleaning.clean import Cleaning
-
+def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:
+    """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
     bad = "drop" if options.drop_bad else "refuse"
     same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill".split()
     return Cleaning(
@@ -84,9 +79,6 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
         channels: Names of the channels.
         suffixes: Allowed file extensions; the first is used for files in a folder.
     """
-    from enhsim_tf.common.atomic_files import make_folder
-    from enhsim_tf.simulator.model_folder import folder_of
-
     names, is_folder = list(channels), os.path.isdir(out)
     if out.suffix in suffixes and not is_folder:
         if len(names) > 1:
@@ -118,8 +110,6 @@ def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict
 
     A single channel and a single model of one channel match even if their names differ.
     """
-    from enhsim_tf.simulator.model_folder import channels_of
-
     series = list(series)
     wanted = {name: channels_of(folder) for name, folder in models.items()}
     if len(series) == len(wanted) == 1 and len(next(iter(wanted.values()))) == 1:
@@ -136,13 +126,8 @@ def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict
     return found
 
 
-def cleaned_channels(
-    series: "Mapping[str, pd.Series]", names: Mapping[str, str], cleaning: "Cleaning"
-) -> "tuple[Recording, dict[str, Cleaned]]":
+def cleaned_channels(series: Mapping[str, pd.Series], names: Mapping[str, str], cleaning: Cleaning) -> tuple[Recording, dict[str, Cleaned]]:
     """Cleans the channels of a model, whose names in the source are given, brings them onto one clock, and returns what was cleaned."""
-    from enhsim_tf.simulator.joint import join_channels
-    from enhsim_tf.telemetry.cleaning.clean import clean
-
     cleaned = {channel: clean(series[name], cleaning) for channel, name in names.items()}
     joined = join_channels({channel: each.parts for channel, each in cleaned.items()})
     if len(joined) > 1:
@@ -153,19 +138,14 @@ def cleaned_channels(
     return joined[0], cleaned
 
 
-def run_for(simulator: "EnhancedSimulator", options: argparse.Namespace, cleaning: "Cleaning") -> "Recording | None":
+def run_for(simulator: EnhancedSimulator, options: argparse.Namespace, cleaning: Cleaning) -> Recording | None:
     """Reads the coarse run that a simulator needs: the commands of the telemetry's own file, or the run of `--coarse`; None for waves."""
     if not simulator.is_run_model:
         if options.coarse is not None:
             simulator.recorded_runs()
         return None
-    from enhsim_tf.coarse_simulator.recording_files import read_recording
-
     commands = simulator.alignment.commands
     if commands is not None and options.coarse is None:
-        from enhsim_tf.coarse_simulator.commands import CommandTraces
-        from enhsim_tf.telemetry.arrays import read_commands
-
         found = read_commands(options.source)
         if found is None:
             raise InputError(

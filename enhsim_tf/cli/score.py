@@ -3,7 +3,8 @@
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from enhsim_tf.cli.options import (
     channels_by_model,
@@ -17,28 +18,21 @@ from enhsim_tf.cli.options import (
 )
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import printable, spoken
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.simulator.model_folder import models_of
+from enhsim_tf.simulator.options import ScoreOptions
+from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.cleaning.report import lines_of
+from enhsim_tf.telemetry.sources import read_source
 
 
 def run_score(options: argparse.Namespace) -> int:
     """Scores the channels of the source with their simulators and returns the exit code."""
-    from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
-    from enhsim_tf.simulator.options import ScoreOptions
-
     named = {option_name(name): name for name in (RESIDUAL, *all_detectors())}
     detector = None if options.detector is None else named[options.detector]
     chosen = ScoreOptions(detector, options.num_windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_options(options, 2)
-    from enhsim_tf.simulator.model_folder import models_of
-    from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
-    from enhsim_tf.telemetry.cleaning.report import lines_of
-    from enhsim_tf.telemetry.sources import read_source
-
     models = models_of(options.models)
     series = read_source(options.source, options.column, options.time, cleaning)
     channels = channels_by_model(series, models)
@@ -54,7 +48,7 @@ def run_score(options: argparse.Namespace) -> int:
         frame = score(simulator, telemetry, run, chosen)
         write_scores(paths[model], frame)
         if options.figure:
-            from enhsim_tf.simulator.figures import score_figure
+            from enhsim_tf.simulator.figures import score_figure  # matplotlib is slow to import
 
             score_figure(frame, simulator, spoken(simulator.channels)).savefig(paths[model].with_suffix(".png"), dpi=200, format="png")
         found[source_names[model]] = {
@@ -76,9 +70,7 @@ def run_score(options: argparse.Namespace) -> int:
     return code
 
 
-def _said(frame: "pd.DataFrame", simulator: "EnhancedSimulator", path: Path) -> list[str]:
-    from enhsim_tf.simulator.scoring import events_path
-
+def _said(frame: pd.DataFrame, simulator: EnhancedSimulator, path: Path) -> list[str]:
     name, trained, lines = spoken(simulator.channels), simulator.trained, []
     if not trained.get("keeps_promise", True):
         lines.append(

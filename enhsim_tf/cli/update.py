@@ -6,23 +6,23 @@ import os
 from pathlib import Path
 
 from enhsim_tf.cli.options import channels_by_model, cleaned_channels, cleaning_options, for_each, run_for
+from enhsim_tf.common.atomic_files import replace_folder, write_json
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.simulator.model_folder import folder_of, models_of, refuse_foreign
+from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.updating import update
+from enhsim_tf.telemetry.cleaning.report import lines_of
+from enhsim_tf.telemetry.sources import read_source
 
 
 def run_update(options: argparse.Namespace) -> int:
     """Updates the simulators of the channels of the source and returns the exit code."""
-    from enhsim_tf.common.atomic_files import make_folder, replace_folder, write_json
-    from enhsim_tf.simulator.model_folder import folder_of, models_of, refuse_foreign
-    from enhsim_tf.simulator.options import FitOptions
-
     FitOptions(held_out=options.held_out, seed=options.seed)  # checks both
     models = models_of(options.models)
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
     cleaning = cleaning_options(options, 2, "missing")
-    from enhsim_tf.telemetry.cleaning.report import lines_of
-    from enhsim_tf.telemetry.sources import read_source
-
     series = read_source(options.source, options.column, options.time, cleaning)
     channels = channels_by_model(series, models)
     folders = {model: folder_of(out, model) for model in channels}
@@ -34,9 +34,6 @@ def run_update(options: argparse.Namespace) -> int:
                 f"Expected --out without a model of {printable(model)}, because update keeps the old one. Received: {folder}. "
                 "Give another --out, or --replace."
             )
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
-    from enhsim_tf.simulator.updating import update
-
     found = {}
 
     def write(model: str) -> None:
@@ -44,7 +41,6 @@ def run_update(options: argparse.Namespace) -> int:
         simulator = EnhancedSimulator.load(models[model])
         run = run_for(simulator, options, cleaning)
         updated, report = update(simulator, telemetry, run, options.held_out, options.seed)
-        make_folder(out)
         kept = {"update": report.to_dict(), "cleaning": {name: each.report.to_dict() for name, each in cleaned.items()}}
         with replace_folder(folders[model]) as temporary:
             updated.save(temporary)

@@ -3,12 +3,11 @@
 import argparse
 
 from enhsim_tf.common.console import tell
+from enhsim_tf.datasets.folder import find_problems, read_manifest
 
 
 def run_verify(options: argparse.Namespace) -> int:
     """Verifies a large data set against its manifest, prints one line for each problem, and returns the exit code."""
-    from enhsim_tf.datasets.folder import find_problems, read_manifest
-
     code = 0
     for line in find_problems(options.folder):
         tell(line)

@@ -1,4 +1,1 @@
-"""Utilities for all other packages: errors, atomic file writing, size limits, console output and parallel work.
-
-This package does not depend on telemetry and imports none of the other packages.
-"""
+"""What every package uses: errors, files, console, stages, parallel work, TensorFlow and training. It depends on no other package."""

@@ -142,12 +142,7 @@ def _remove(path: Path) -> None:
 
 
 def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None:
-    """Removes what killed processes left in a folder, and restores old content that they had only moved aside.
-
-    Args:
-        folder: The folder in which `replace_folder` or `replace_file` was writing.
-        name: Considers only what was to get this name. None: every name.
-    """
+    """Removes what killed processes left in a folder, of this name if one is given, and restores old content that they had moved aside."""
     folder = Path(folder)
     for left in {path.with_name(path.name.removesuffix(".lock")) for path in folder.glob(".*.enhsim_tf*")}:
         named = _LEFT.fullmatch(left.name)

@@ -4,15 +4,11 @@ import argparse
 import math
 import os
 import sys
-import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import NoReturn
 
 from enhsim_tf.common.errors import InputError, printable
-
-if TYPE_CHECKING:
-    from tqdm import tqdm
 
 
 class Parser(argparse.ArgumentParser):
@@ -33,51 +29,32 @@ def tell(line: str) -> None:
     print(f"{text}\n", end="", flush=True)  # text and line break in one write, since other processes may print at the same time
 
 
-def progress(*arguments: Any, **options: Any) -> "tqdm":
-    """Creates a `tqdm` progress bar whose lock is of this process: of a shared one, Python warns when a worker is terminated."""
-    from tqdm import tqdm
-
-    tqdm.set_lock(threading.RLock())
-    return tqdm(*arguments, **options)
-
-
-INTERVAL_S = 15.0  # without a terminal, seconds between two progress lines
+INTERVAL_S = 15.0  # seconds between two progress lines
 
 
 class Progress:
-    """Reports the progress of long work as text lines, for output that cannot show progress bars.
+    """Reports the progress of long work as lines of text, with which `tell` is called; each begins with `before`."""
 
-    Args:
-        tell: Called with each line. None: no lines are printed.
-        before: Prefix of each line, such as the name of the work.
-        clock: Monotonic clock in seconds.
-    """
-
-    def __init__(self, tell: Callable[[str], None] | None = None, before: str = "", clock: Callable[[], float] = time.monotonic):
+    def __init__(self, tell: Callable[[str], None], before: str = "", clock: Callable[[], float] = time.monotonic):
         self.tell, self.before, self.clock, self.last_line_s = tell, before, clock, clock()
 
     def step(self, what: str) -> None:
         """Says at once what begins, such as `noise`."""
-        if self.tell is not None:
-            self.last_line_s = self.clock()
-            self.tell(f"{self.before}{what} ...")
+        self.last_line_s = self.clock()
+        self.tell(f"{self.before}{what} ...")
 
     def loop(self, unit: str, total: int) -> Callable[[float], None]:
         """Starts to report a loop, by a line when `INTERVAL_S` seconds have passed since the last one.
 
         The remaining time is extrapolated from all steps except the first, which also builds the network's graph.
 
-        Args:
-            unit: What the loop counts, such as `epoch`.
-            total: Number of units in the loop.
-
         Returns:
-            A function to be called with the number of finished units, which may be fractional.
+            A function to be called with the number of finished units, such as epochs, which may be fractional.
         """
         first: list[float] = []  # time at which the first step ended, and units finished by then
 
         def told(done: float) -> None:
-            if self.tell is None or not 0 < done < total:
+            if not 0 < done < total:
                 return
             now = self.clock()
             if not first:
@@ -93,7 +70,7 @@ class Progress:
         return told
 
 
-SILENT = Progress()
+SILENT = Progress(lambda line: None)
 
 
 def _time_left(seconds: float) -> str:
@@ -103,11 +80,7 @@ def _time_left(seconds: float) -> str:
 
 
 def run_command(run: Callable[[], int], interrupted: str) -> int:
-    """Runs a command and prints its error as one line.
-
-    Args:
-        run: The command, a function that returns the exit code.
-        interrupted: Message printed after an interrupt.
+    """Runs a command, a function that returns the exit code, and prints its error as one line, or the words for an interrupt.
 
     Returns:
         The exit code: 2 for a user's mistake and for errors of files or memory; as in shells, 130 for an interrupt and 141 for a

@@ -37,9 +37,5 @@ def printable(text: str) -> str:
 
 
 def spoken(channels: Sequence[str]) -> str:
-    """Returns the channels as a line of a report names them: up to three by their names, more by their number.
-
-    Args:
-        channels: Names of the channels.
-    """
+    """Returns the channels as a line of a report names them: up to three by their names, more by their number."""
     return printable(", ".join(channels) if len(channels) <= 3 else f"{len(channels)} channels")

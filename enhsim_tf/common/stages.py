@@ -1,10 +1,9 @@
 """Cached stages: each result is stored under a hash of what it depends on and reused by the next run.
 
-A stage is a function that fills a folder. The folder is moved into place when it is complete. Its name contains a hash of the stage's
-settings, of its version, of the stages before it, and of the versions of packages. A person raises the version when changed code changes
-the result; code that was moved or renamed finds its results again. An interrupted run leaves only complete stages; the next run continues
-after the last one and removes incomplete ones. `stage.json` holds the checksums of the files: a stage that was damaged since is reported
-and run again.
+A stage is a function that fills a folder, which is moved into place when it is complete. Its name contains a hash of the stage's settings
+and version, of the stages before it, and of the versions of packages. A person raises the version when changed code changes the result.
+An interrupted run leaves only complete stages, after which the next one continues. `stage.json` holds the checksums of the files: a stage
+that was damaged since is reported and run again.
 """
 
 import hashlib
@@ -83,7 +82,7 @@ class Stages:
         began, outer = time.perf_counter(), self.progress
         # if two runs make the same stage, the first result is kept, because the other run may read it
         with replace_folder(folder, keep=lambda path: not self.fresh and _read(path) is not None) as temporary:
-            self.progress = Progress(self.tell if self.speaks else None, f"{name:12} ")
+            self.progress = Progress(self.tell, f"{name:12} ") if self.speaks else SILENT
             try:
                 make(temporary)
             finally:

@@ -14,16 +14,13 @@ def seeded_initialiser(name: str, seed: int) -> keras.initializers.Initializer:
 
 
 def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> keras.Sequential:
-    """Builds a stack of Dense layers with relu activations, except for the last layer, which is linear.
+    """Builds an uncompiled stack of Dense layers with relu activations, except for the last layer, which is linear.
 
     Args:
         window: Number of samples in an input window.
         units: Number of units of each layer.
         seed: Seed for the initial weights, from which each layer derives its own.
         name: Name of the model.
-
-    Returns:
-        An uncompiled Keras model.
     """
     model = keras.Sequential([keras.Input((window,))], name=name)
     for number, width in enumerate(units):

@@ -11,9 +11,11 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import filelock
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from enhsim_tf.common.atomic_files import sha256, write_json
 from enhsim_tf.common.errors import InputError
@@ -21,9 +23,6 @@ from enhsim_tf.common.size_limits import read_json
 from enhsim_tf.datasets.mix import MOST_WINDOWS
 from enhsim_tf.datasets.plan import FORMAT, MOST_VALUES, Plan
 from enhsim_tf.datasets.shard import Record, shard_file, shard_schema
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of Parquet folders skip such names
 _SHARD = re.compile(r"shard-(\d{6,})\.parquet")
@@ -34,12 +33,7 @@ _LONGEST_LINE = 1_000  # maximum bytes of a journal line; longer lines are read 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Creates a folder and locks it against other runs. The operating system releases the lock when this process ends for any reason.
-
-    Raises:
-        InputError: If another run has locked the folder.
-        OSError: If the folder is not writable.
-    """
+    """Creates a folder and locks it against other runs. The operating system releases the lock when this process ends for any reason."""
     folder.mkdir(parents=True, exist_ok=True)
     open(folder / _LOCK, "ab").close()  # no probe beside it: another run may be looking at what is there
     lock = filelock.FileLock(folder / _LOCK, blocking=False, preserve_lock_file=True)  # or where there are no locks, a mark that stays
@@ -179,10 +173,7 @@ def find_problems(folder: str | os.PathLike) -> Iterator[str]:
             yield f"{path.name}: not a file of this data set"
 
 
-def _problem_of(folder: Path, record: Record, schema: "pa.Schema") -> str | None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
+def _problem_of(folder: Path, record: Record, schema: pa.Schema) -> str | None:
     path = folder / shard_file(record.shard)
     if not path.is_file():
         return "missing"

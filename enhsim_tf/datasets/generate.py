@@ -7,13 +7,12 @@ bytes of the result do not depend on the engine, the number of workers or the nu
 
 import contextlib
 import os
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from enhsim_tf.common.atomic_files import remove_leftovers
-from enhsim_tf.common.console import progress
+from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.datasets.folder import JOURNAL, MANIFEST, check_folder, is_intact, locked, open_journal, read_records, write_manifest
@@ -54,20 +53,21 @@ def generate_data_set(
 def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Callable[[str], None]) -> None:
     if not (out / MANIFEST).exists():
         write_manifest(out, plan)
-    began, quiet = time.monotonic(), not sys.stderr.isatty()
-    recorded = read_records(out)
+    began, recorded = time.monotonic(), read_records(out)
     records: dict[int, Record] = {}
-    for number in progress(range(plan.num_shards), "checking", unit="shards", disable=quiet or not recorded, leave=False):
+    checked = Progress(tell, "checking ").loop("shard", plan.num_shards)
+    for number in range(plan.num_shards):
         record = recorded.get(number)
         if record is not None and record.rows == plan.num_windows_in(number) and is_intact(out, record):
             records[number] = record
+        checked(number + 1)
     if recorded:
         tell(f"{len(records):,} of {plan.num_shards:,} shards are there and intact; {plan.num_shards - len(records):,} to generate")
     kept = sum(record.rows for record in records.values())
     missing = (number for number in range(plan.num_shards) if number not in records)
-    bar = progress(total=plan.num_windows, initial=kept, unit="windows", unit_scale=True, disable=quiet, smoothing=0.05)
+    made, generated = 0, Progress(tell).loop("window", plan.num_windows)
     running = engines.run(engine, ShardMaker(plan, out), missing, workers)  # starts no worker if no shard is missing
-    with bar, open_journal(out) as write, contextlib.closing(running):
+    with open_journal(out) as write, contextlib.closing(running):
         for record in running:
             name, before = shard_file(record.shard), recorded.get(record.shard, record)
             if before.sha256 != record.sha256 and before.rows == record.rows:
@@ -82,9 +82,10 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
                 )
             write(record)
             records[record.shard] = record
-            bar.update(record.rows)
+            made += record.rows
+            generated(kept + made)
     write_manifest(out, plan, records)
     (out / JOURNAL).unlink(missing_ok=True)
-    made, seconds = plan.num_windows - kept, time.monotonic() - began
+    seconds = time.monotonic() - began
     rate = f", {made:,} of them now, {made / seconds:,.0f} a second" if made else ""
     tell(f"{plan.num_windows:,} windows of {plan.window} samples in {plan.num_shards:,} shards in {out}{rate}")

@@ -6,19 +6,18 @@ how channels move together, and one is a fault that acts on all of them.
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import series_table
 from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_length, parse_place
 from enhsim_tf.detection.anomalies import INJECTIONS, Anomaly, check_kind, draw_begin, estimate_noise_sd, inject_anomalies
+from enhsim_tf.simulator.joint import telemetry_of
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 JOINT_KINDS = ("another_time", "delay", "lost_coupling", "common_shift")
 _MOST = 10_000  # anomalies in a channel
@@ -84,7 +83,7 @@ class InjectOptions:
             _checked_place(text)
 
 
-def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.DataFrame":
+def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.DataFrame:
     """Injects anomalies into the nominal telemetry of a channel.
 
     Args:
@@ -132,18 +131,12 @@ def _checked_place(text: str) -> Place:
     return place
 
 
-def _index_of(parts: Sequence[Telemetry]) -> "pd.Index":
-    import pandas as pd
-
-    from enhsim_tf.telemetry.pandas_series import to_series
-
+def _index_of(parts: Sequence[Telemetry]) -> pd.Index:
     return pd.concat([to_series(part) for part in parts]).index
 
 
-def join_injected(frames: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
+def join_injected(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Joins the tables of `inject_channel` to one with the values of all channels and `mask`, which marks what is changed in any of them."""
-    import pandas as pd
-
     (first, frame), *others = frames.items()
     for name, other in others:
         if not other.index.equals(frame.index):
@@ -155,7 +148,7 @@ def join_injected(frames: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
     return pd.DataFrame(values | {"mask": np.any([each["mask"] for each in frames.values()], axis=0)}, index=frame.index)
 
 
-def inject_joint(telemetry: Recording, options: InjectOptions) -> "pd.DataFrame":
+def inject_joint(telemetry: Recording, options: InjectOptions) -> pd.DataFrame:
     """Injects anomalies of `JOINT_KINDS` into nominal telemetry of several channels, at drawn places.
 
     Args:
@@ -166,8 +159,6 @@ def inject_joint(telemetry: Recording, options: InjectOptions) -> "pd.DataFrame"
         A data frame with one row per sample: the channels, `label_columns.LABELS` and `mask NAME` for each channel. Samples that are not marked
         keep their values. `frame.attrs["anomalies"]` has kind, severity, begin, end and channel of each.
     """
-    from enhsim_tf.simulator.joint import telemetry_of
-
     kinds = options.kinds
     if len(telemetry.columns) < 2:
         raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")

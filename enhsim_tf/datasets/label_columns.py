@@ -15,16 +15,14 @@ Values are in the column `value` or `window`. Of several channels, each has its 
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+import pyarrow as pa
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import pyarrow as pa
 
 NOMINAL = "nominal"
 LABELS = ("scenario", "severity", "onset", "end", "mask")
@@ -32,19 +30,13 @@ _TIMEEVAL = ("timestamp", "is_anomaly")  # the first and the last column of Time
 
 
 def series_table(
-    values: np.ndarray, masks: np.ndarray, channels: Sequence[str], events: Sequence[tuple[str, float, int, int]], index: "pd.Index"
-) -> "pd.DataFrame":
+    values: np.ndarray, masks: np.ndarray, channels: Sequence[str], events: Sequence[tuple[str, float, int, int]], index: pd.Index
+) -> pd.DataFrame:
     """Makes the labelled table of a series. A sample that was not changed is labelled nominal, also within an event.
 
-    Args:
-        values: float32 of shape `(samples, channels)`.
-        masks: Which samples were changed, same shape.
-        channels: Names of the channels.
-        events: Name, severity, onset and end of each event, in the order of time and without overlaps.
-        index: Index of the table.
+    `values` are float32 of shape `(samples, channels)`, and `masks` mark the changed samples. `events` are name, severity, onset and end of
+    each, in the order of time and without overlaps.
     """
-    import pandas as pd
-
     mask, is_joint = masks.any(axis=1), len(channels) > 1
     names = list(dict.fromkeys([NOMINAL, *(name for name, *_ in events)]))
     codes, severity, onset, end = (np.zeros(len(mask), dtype) for dtype in (np.int8, np.float32, np.int32, np.int32))
@@ -66,19 +58,14 @@ def series_table(
 
 def window_table(
     windows: np.ndarray, masks: np.ndarray, channels: Sequence[str], names: Sequence[str], severities: Sequence[float]
-) -> "pa.Table":
+) -> pa.Table:
     """Makes the labelled table of windows. A window in which no sample was changed is labelled nominal, with the severity 0.
 
-    Args:
-        windows: float32 of shape `(windows, samples, channels)`.
-        masks: Which samples were changed, same shape.
-        channels: Names of the channels.
-        names: Scenario of each window, which may be nominal.
-        severities: Severity of the scenario of each window.
+    `windows` are float32 of shape `(windows, samples, channels)`, and `masks` mark the changed samples. `names` and `severities` are the
+    scenario of each window, which may be nominal.
     """
-    import pyarrow as pa
 
-    def lists(values: np.ndarray) -> "pa.Array":
+    def lists(values: np.ndarray) -> pa.Array:
         return pa.FixedSizeListArray.from_arrays(pa.array(np.ascontiguousarray(values).ravel()), values.shape[1])
 
     mask, samples, is_joint = masks.any(axis=2), windows.shape[1], len(channels) > 1
@@ -94,13 +81,13 @@ def window_table(
     return pa.table(columns | {f"mask {name}": lists(masks[:, :, number]) for number, name in enumerate(channels) if is_joint})
 
 
-def window_schema(window: int, channels: Sequence[str]) -> "pa.Schema":
+def window_schema(window: int, channels: Sequence[str]) -> pa.Schema:
     """Returns the schema of `window_table` for windows of some length."""
     none = np.zeros((0, window, len(channels)), np.float32)
     return window_table(none, none > 0, channels, [], []).schema
 
 
-def parquet_options(schema: "pa.Schema") -> dict[str, Any]:
+def parquet_options(schema: pa.Schema) -> dict[str, Any]:
     """Returns the options with which Parquet files of windows are written.
 
     Values store bytes of equal significance together: signs and exponents compress well, noisy mantissas do not.
@@ -110,7 +97,7 @@ def parquet_options(schema: "pa.Schema") -> dict[str, Any]:
     return {"compression": "zstd", "use_dictionary": texts, "column_encoding": encoding, "write_statistics": texts}
 
 
-def write_table(path: str | os.PathLike, frame: "pd.DataFrame", timeeval: Sequence[str] = ()) -> None:
+def write_table(path: str | os.PathLike, frame: pd.DataFrame, timeeval: Sequence[str] = ()) -> None:
     """Writes a labelled series to a `.csv` or `.parquet` file, which appears only when it is complete.
 
     Args:
@@ -122,8 +109,6 @@ def write_table(path: str | os.PathLike, frame: "pd.DataFrame", timeeval: Sequen
     Raises:
         InputError: If a channel has the name of another column of TimeEval's CSV.
     """
-    import pandas as pd
-
     table = frame.reset_index()
     table.attrs = {}  # Parquet would store them as JSON
     if timeeval:

@@ -3,25 +3,24 @@
 import dataclasses
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.trusted_range import TrustedRange
 from enhsim_tf.telemetry.series import nanoseconds
-
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _MOST_ROWS = 10**9
 _OWN = ("copy", "time", "sample", "value", "out_of_range")
 
 
-def write_copies(path: str | os.PathLike, model: "EnhancedSimulator", run: Recording, num_copies: int, seed: int = 0) -> int:
+def write_copies(path: str | os.PathLike, model: EnhancedSimulator, run: Recording, num_copies: int, seed: int = 0) -> int:
     """Writes copies of a run to one Parquet file, which appears only when it is complete, and returns the number of rows.
 
     The columns are `copy` (from 0), `time` (of the telemetry, that is with the delay of the model; `sample` if the run has no
@@ -37,9 +36,6 @@ def write_copies(path: str | os.PathLike, model: "EnhancedSimulator", run: Recor
     Raises:
         InputError: If the run cannot be enhanced, a carried column has the name of another column, or there are too many rows.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     usable = model.alignment.usable(run)
     num_rows = num_copies * len(usable)
     if num_copies < 1 or num_rows > _MOST_ROWS:
@@ -58,13 +54,8 @@ def write_copies(path: str | os.PathLike, model: "EnhancedSimulator", run: Recor
     return num_rows
 
 
-def _shared_columns(model: "EnhancedSimulator", usable: Recording) -> "tuple[dict[str, pa.Array], dict[str, pa.Array]]":
+def _shared_columns(model: EnhancedSimulator, usable: Recording) -> tuple[dict[str, pa.Array], dict[str, pa.Array]]:
     """Returns the columns that are the same in every copy: the times, and the score of the range with what is carried."""
-    import pandas as pd
-    import pyarrow as pa
-
-    from enhsim_tf.simulator.trusted_range import TrustedRange
-
     trusted = TrustedRange(model)
     taken = [name for name in usable.parts[0].carried if name in _OWN]
     if taken:
@@ -87,12 +78,8 @@ def _shared_columns(model: "EnhancedSimulator", usable: Recording) -> "tuple[dic
     return time, others
 
 
-def coverage_lines(model: "EnhancedSimulator", run: Recording) -> list[str]:
+def coverage_lines(model: EnhancedSimulator, run: Recording) -> list[str]:
     """Says which share of a run the training range covers, as a whole and for each of at most 20 values of its column `scenario`."""
-    import pandas as pd
-
-    from enhsim_tf.simulator.trusted_range import TrustedRange
-
     trusted = TrustedRange(model)
     usable = model.alignment.usable(run)
     covered = np.concatenate([trusted.score_run(part.values) <= 1 for part in usable.parts])

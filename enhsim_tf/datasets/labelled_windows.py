@@ -4,9 +4,10 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
 
 from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
 from enhsim_tf.common.atomic_files import make_folder, replace_file
@@ -15,11 +16,7 @@ from enhsim_tf.datasets.label_columns import parquet_options, series_table, wind
 from enhsim_tf.datasets.places import parse_start
 from enhsim_tf.detection.anomalies import TRIES, draw_begin
 from enhsim_tf.simulator.changes import fade_length
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,21 +42,14 @@ def divide_windows(scenarios: Sequence[Degraded], nominal_share: float, num_wind
     return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
-def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulator", shares: Sequence[Share]) -> dict[Degraded, int]:
+def write_windows_labelled(path: str | os.PathLike, simulator: EnhancedSimulator, shares: Sequence[Share]) -> dict[Degraded, int]:
     """Writes labelled windows to one Parquet file, chunk by chunk. The file appears only when it is complete.
 
     A window that its scenario has not changed, such as one in which the mechanism would have stood still anyway, is labelled nominal.
 
-    Args:
-        path: Path of the file.
-        simulator: The simulator.
-        shares: The scenarios and their numbers of windows.
-
     Returns:
         For each scenario, the number of its windows that are labelled nominal because it has changed no sample of them.
     """
-    import pyarrow.parquet as pq
-
     channels, unchanged = simulator.channels, {}
     about = {"interval_s": repr(simulator.interval_s), "channel": ", ".join(channels)}
     schema = window_schema(simulator.window, channels).with_metadata(about)
@@ -75,10 +65,8 @@ def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulato
     return unchanged
 
 
-def series_index(num_samples: int, interval_s: float, start: "str | pd.Timestamp | None" = None) -> "pd.Index":
+def series_index(num_samples: int, interval_s: float, start: str | pd.Timestamp | None = None) -> pd.Index:
     """Returns the index of a generated series: times in UTC named `time`, or, without a start, seconds from 0 named `time_s`."""
-    import pandas as pd
-
     seconds = np.arange(num_samples) * interval_s
     if start is None:
         return pd.Index(seconds, name="time_s")
@@ -86,13 +74,13 @@ def series_index(num_samples: int, interval_s: float, start: "str | pd.Timestamp
 
 
 def series_labelled(
-    simulator: "EnhancedSimulator",
+    simulator: EnhancedSimulator,
     num_samples: int,
     scenario: Degraded | None = None,
     seed: int = 0,
-    start: "str | pd.Timestamp | None" = None,
+    start: str | pd.Timestamp | None = None,
     schedule: Sequence[ScheduledMode] = (),
-) -> "pd.DataFrame":
+) -> pd.DataFrame:
     """Generates one continuous series with labels. Samples that equal those of the nominal series are labelled nominal.
 
     Args:
@@ -120,7 +108,7 @@ def series_labelled(
 
 
 def draw_schedule(
-    simulator: "EnhancedSimulator",
+    simulator: EnhancedSimulator,
     num_samples: int,
     given: Sequence[ScheduledMode],
     modes: Sequence[Degraded],

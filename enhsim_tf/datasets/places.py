@@ -3,15 +3,12 @@
 import dataclasses
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.errors import InputError
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _PLACE = re.compile(r"(?P<kind>\w+)(?::(?P<severity>[^@]+))?@(?P<begin>.+)/(?P<length>[^/]+)")
 _SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
@@ -59,10 +56,8 @@ def parse_num_samples(text: str, interval_s: float) -> int:
     return max(1, round(samples))
 
 
-def parse_start(start: "str | pd.Timestamp") -> "pd.Timestamp":
+def parse_start(start: str | pd.Timestamp) -> pd.Timestamp:
     """Converts a time such as `2024-01-01`, from 1700 to 2200, to UTC. A time without a time zone is taken as UTC."""
-    import pandas as pd
-
     try:
         time = pd.to_datetime(start, utc=True, format="ISO8601").as_unit("ns")
     except (ValueError, TypeError, OverflowError, AttributeError):
@@ -81,13 +76,8 @@ class Place:
     begin: str  # a sample number, or a time
     length: str
 
-    def samples(self, index: "pd.Index", interval_s: float) -> tuple[int, int]:
-        """Returns the first sample and the number of samples.
-
-        Args:
-            index: Index of the series: times in UTC, or anything else for a series without times.
-            interval_s: Sampling interval in seconds.
-        """
+    def samples(self, index: pd.Index, interval_s: float) -> tuple[int, int]:
+        """Returns the first sample and the number of samples; the index of the series has times in UTC, or is that of one without times."""
         length = parse_num_samples(self.length, interval_s)
         if self.begin.isdecimal():
             return int(self.begin[:12]), length
@@ -104,12 +94,7 @@ class Place:
 
 
 def parse_place(text: str, severity: float | None = None) -> Place:
-    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`, such as `ramp:4@5000/200` or `stuck:1@2024-01-05T12:00/2h`. The kind is not checked.
-
-    Args:
-        text: The place.
-        severity: What a place without a severity gets.
-    """
+    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`, such as `ramp:4@5000/200` or `stuck:1@2024-01-05T12:00/2h`. The kind is not checked."""
     found = _PLACE.fullmatch(text)
     try:
         if not found:

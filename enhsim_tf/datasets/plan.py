@@ -116,15 +116,7 @@ def plan_key(settings: Mapping[str, Any]) -> str:
 
 
 def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int, name: str | None = None) -> Plan:
-    """Makes the plan of a data set.
-
-    Args:
-        mix: Scenarios and models with their shares. If it names no models, `folder` itself is the only model.
-        folder: Folder of the models.
-        seed: Master seed of the data set.
-        num_windows: Total number of windows.
-        name: Name of the only model. None: that of its folder.
-    """
+    """Makes the plan of a data set. If the mix names no models, `folder` itself is the only one, and `name` the name of it or of its folder."""
     folder = Path(folder).absolute()
     models = tuple(_model_of(each.name, folder / each.folder, each.share, mix) for each in mix.models)
     models = models or (_model_of(name or folder.name, folder, 1.0, mix),)

@@ -8,9 +8,11 @@ import functools
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import replace_file, sha256
@@ -18,11 +20,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import NOMINAL, parquet_options, window_schema, window_table
 from enhsim_tf.datasets.plan import FORMAT, Plan, plan_key
 from enhsim_tf.simulator.model_folder import MANIFEST
-
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _STREAM = 0x666C656574  # distinguishes these seeds from all others in the package
 _START_RANGE = 1_000_000  # windows start at a random sample below this one, so that every phase of the waves occurs
@@ -78,7 +76,7 @@ def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator)
     return rng.permutation(np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1]))
 
 
-def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: int) -> tuple[np.ndarray, np.ndarray, Rows]:
+def make_windows(plan: Plan, simulators: Sequence[EnhancedSimulator], shard: int) -> tuple[np.ndarray, np.ndarray, Rows]:
     """Generates the windows of a shard with the loaded models of the plan.
 
     Returns:
@@ -113,10 +111,8 @@ def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
     return Degraded(part.mode, float(rows.severity[row]), float(rows.onset[row]), part.channel)
 
 
-def shard_schema(settings: dict[str, Any]) -> "pa.Schema":
+def shard_schema(settings: dict[str, Any]) -> pa.Schema:
     """Returns the Parquet schema of the shards of a data set, from `Plan.settings`."""
-    import pyarrow as pa
-
     schema = window_schema(settings["window"], settings.get("channels", ("",)))
     if len(settings["models"]) > 1:
         schema = schema.append(pa.field("model", pa.string()))
@@ -131,15 +127,13 @@ class ShardMaker:
         self.settings = plan.settings()  # computed on the main machine; workers on other machines must agree
 
     @functools.cached_property
-    def simulators(self) -> list["EnhancedSimulator"]:
+    def simulators(self) -> list[EnhancedSimulator]:
         """The loaded models of the plan, if they are still the same, and the libraries of this machine too."""
         if self.plan.settings() != self.settings:
             versions = ", ".join(f"{name} {version}" for name, version in self.settings["versions"].items())
             raise InputError(
                 f"Expected every machine to have {versions}. Received: other versions on {os.uname().nodename}. Install these."
             )
-        from enhsim_tf.simulator.simulator import EnhancedSimulator
-
         simulators = []
         for model in self.plan.models:
             simulators.append(EnhancedSimulator.load(model.folder))
@@ -149,9 +143,6 @@ class ShardMaker:
 
     def __call__(self, shard: int) -> Record:
         """Generates a shard, writes its file atomically, and returns its record."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         windows, masks, rows = make_windows(self.plan, self.simulators, shard)
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
         table, path = window_table(windows, masks, self.plan.channels, modes[rows.scenario], rows.severity), self.folder / shard_file(shard)

@@ -29,8 +29,6 @@ from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
 from enhsim_tf.telemetry.series import check_values
 
-THREADS = 1  # of a worker
-
 
 @dataclasses.dataclass(frozen=True)
 class Job:
@@ -127,7 +125,7 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
         some, workers = batches.pop()
         waiting = {job.name: job for job in some}
         try:
-            with contextlib.closing(engines.run(engine, fit_or_say, some, workers, THREADS)) as running:
+            with contextlib.closing(engines.run(engine, fit_or_say, some, workers)) as running:
                 for outcome in running:
                     del waiting[outcome.name]
                     yield outcome

@@ -33,24 +33,23 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None,
         raise InputError(
             f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
         ) from None
-    if array.ndim not in (1, 2) or array.dtype.names:
-        shape = "fields" if array.dtype.names else array.shape
-        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    if array.ndim not in (1, 2):
+        raise InputError(
+            f"Expected an array of shape (samples,) or (samples, columns). Received: {array.shape} in {path.name}. Reshape it."
+        )
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
     if columns is None and array.shape[1] > MAX_COLUMNS:
         raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
-    known = [str(number) for number in range(array.shape[1])]
-    for column in columns or ():
+    known, last, found = {str(number): number for number in range(array.shape[1])}, array.shape[1] - 1, {}
+    has_commands = columns is None and _has_commands(array)
+    for column in ["0"] if has_commands else columns or known:
         if column not in known:
-            raise InputError(
-                f"Expected a column of {path.name}, a number from 0 to {len(known) - 1}. Received: {column!r}. Name one of these."
-            )
-    is_first_only = columns is None and _has_commands(array)
-    names = {column: path.stem if len(known) == 1 else f"{path.stem}.{column}" for column in known}
-    found = {names[each]: pd.Series(array[:, int(each)], name=names[each]) for each in (["0"] if is_first_only else columns or known)}
-    if is_first_only:
-        text = f"columns 1 to {len(known) - 1} hold only 0 and 1 and were taken as commands, not as channels: {len(known) - 1}"
-        found[names["0"]].attrs["findings"] = [Finding("commands", len(known) - 1, text).to_dict()]
+            raise InputError(f"Expected a column of {path.name}, a number from 0 to {last}. Received: {column!r}. Name one of these.")
+        name = path.stem if last == 0 else f"{path.stem}.{column}"
+        found[name] = pd.Series(array[:, known[column]], name=name)
+        if has_commands:
+            text = f"columns 1 to {last} hold only 0 and 1 and were taken as commands, not as channels: {last}"
+            found[name].attrs["findings"] = [Finding("commands", last, text).to_dict()]
     return found
 
 

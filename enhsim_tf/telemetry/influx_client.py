@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv
 from influxdb_client import Dialect, InfluxDBClient
 from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
 from influxdb_client.client.write_api import SYNCHRONOUS
@@ -35,13 +37,7 @@ _TIMEOUT_MS = 60_000  # timeout of a request if INFLUXDB_V2_TIMEOUT is not set; 
 class InfluxServer:
     """One bucket of the server that `INFLUXDB_V2_URL`, `INFLUXDB_V2_TOKEN` and `INFLUXDB_V2_ORG` name.
 
-    Args:
-        bucket: Name of the bucket.
-        max_retry_s: How long to retry if a server that has answered before stops answering, in seconds. If a server has never
-            answered, there are no retries.
-
-    Raises:
-        InputError: If a variable is missing or cannot be used.
+    A server that has answered before and stops is asked again for `max_retry_s` seconds; one that has never answered is not.
     """
 
     def __init__(self, bucket: str, max_retry_s: float = 60.0):
@@ -60,12 +56,9 @@ class InfluxServer:
         return InfluxServer, (self.bucket, self.max_retry_s)  # a copy opens its own connection, so the token is not pickled
 
     def send(self, lines: str) -> None:
-        """Writes points. The request can be repeated safely, because writing a point twice stores it once.
+        """Writes points in line protocol, with times in nanoseconds. It can be repeated, as a point that is written twice is stored once.
 
         The client's own writer of data frames is not used: it evaluates the names of tags as code.
-
-        Args:
-            lines: Points in line protocol, with times in nanoseconds.
         """
         self._repeat(lambda: self._client.write_api(SYNCHRONOUS).write(self.bucket, record=lines.encode(), write_precision="ns"))
 
@@ -86,16 +79,10 @@ class InfluxServer:
     def stream(self, wanted: Mapping[str, str]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Streams the points of one series in chronological order, block by block, so that memory does not grow with their number.
 
-        If the connection breaks, the query is repeated from the point after the last one received.
-
-        Args:
-            wanted: Values of the columns that select the series among the points of the bucket.
+        If the connection breaks, the query is repeated from the point after the last one received; see `points` for `wanted`.
 
         Yields:
             Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
-
-        Raises:
-            InputError: If the server does not answer, the connection keeps breaking, or the values are not numbers.
         """
         start_ns, moved = _FIRST_NS, time.monotonic()
         while True:
@@ -170,9 +157,6 @@ def _check_variables() -> tuple[str, str]:
 
 def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Parses the CSV of a response block by block; yields times and values. The client's own parser cuts times to microseconds."""
-    import pyarrow as pa
-    import pyarrow.csv
-
     answer.auto_close = False  # Arrow asks whether it is closed after its end
     types = {"_time": pa.timestamp("ns", "UTC"), "_value": pa.float64()}
     convert = pyarrow.csv.ConvertOptions(column_types=types, include_columns=list(types))

@@ -19,6 +19,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 
 SCHEME = "influxdb://"
+BATCH = 5_000  # points in one request
 _ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions have a time in the year 2100, beyond any retention period
 _CHANNEL, _VERSION = "channel", "version"  # tags of the series written by this class
 _DESCRIBED = [field.name for field in dataclasses.fields(Telemetry) if field.name != "values"]
@@ -27,19 +28,12 @@ _SHOWN = 3  # number of series listed in a message
 
 @dataclasses.dataclass(frozen=True)
 class InfluxLocation:
-    """Location of a series, or of a store with several series, in InfluxDB.
-
-    Args:
-        bucket: Name of the bucket.
-        measurement: Name of the measurement.
-        field: Name of the field.
-        tags: Pairs of tag and value that all points of the location have.
-    """
+    """Location of a series, or of a store with several series, in InfluxDB."""
 
     bucket: str
     measurement: str
     field: str
-    tags: tuple[tuple[str, str], ...] = ()
+    tags: tuple[tuple[str, str], ...] = ()  # pairs of tag and value that all points of the location have
 
     def __str__(self) -> str:
         path = "/".join(map(_encode, (self.bucket, self.measurement, self.field)))
@@ -49,12 +43,6 @@ class InfluxLocation:
 
 def parse_location(text: str) -> InfluxLocation:
     """Parses `influxdb://bucket/measurement/field?tag=value&...`, with `/`, `?`, `&`, `=` and `%` percent-encoded in names.
-
-    Args:
-        text: The location as text.
-
-    Returns:
-        The location.
 
     Raises:
         InputError: If the text does not have this form.
@@ -86,15 +74,14 @@ class InfluxStore:
     Args:
         location: The location, as `influxdb://bucket/measurement/field?tag=value` or as an `InfluxLocation`. Every point gets its
             tags.
-        batch_size: Number of points in one request.
         max_retry_s: How long to retry if a server that has answered before stops answering, in seconds.
 
     Raises:
         InputError: If the location or a variable cannot be used, or if the client is not installed.
     """
 
-    def __init__(self, location: str | InfluxLocation, batch_size: int = 5_000, max_retry_s: float = 60.0):
-        self.location, self.batch_size = parse_location(str(location)), batch_size
+    def __init__(self, location: str | InfluxLocation, max_retry_s: float = 60.0):
+        self.location = parse_location(str(location))
         try:
             from enhsim_tf.telemetry.influx_client import InfluxServer
         except ImportError:
@@ -123,9 +110,9 @@ class InfluxStore:
         tags = dict(self.location.tags) | {_CHANNEL: _as_tag(telemetry.name), _VERSION: version}
         point = {"measurement": self.location.measurement, "tags": tags, "fields": {self.location.field: True}}
         begin = Point.from_dict(point).to_line_protocol().removesuffix("true")
-        for first in range(0, len(values), self.batch_size):
+        for first in range(0, len(values), BATCH):
             # float32 to float64 is exact, and so is the shortest decimal form of the float64
-            batch = zip(*(array[first : first + self.batch_size].tolist() for array in (values, times)), strict=True)
+            batch = zip(*(array[first : first + BATCH].tolist() for array in (values, times)), strict=True)
             self.server.send("\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch]))
         point = {"measurement": _ABOUT, "tags": {"key": self._hash(telemetry.name), "store": self._hash()}, "time": _ABOUT_NS}
         self.server.send(Point.from_dict(point | {"fields": {"about": json.dumps(about | {_VERSION: version})}}).to_line_protocol())

@@ -8,8 +8,10 @@ import urllib.parse
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
-from enhsim_tf.common.atomic_files import encode_name, make_folder, replace_folder
+from enhsim_tf.common.atomic_files import encode_name, replace_folder
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import check_parquet, short_reason
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
@@ -35,9 +37,6 @@ class ParquetStore:
         Raises:
             InputError: If the series has no name or no samples, or its folder holds other files.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         if not telemetry.name or not len(telemetry):
             raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
         channel = self._channel(telemetry.name)
@@ -45,7 +44,6 @@ class ParquetStore:
         if others or channel.is_file():
             what = f"which holds {others[0]!r}" if others else "a file"
             raise InputError(f"Expected a place for the series. Received: {channel}, {what}. Name another folder for the store.")
-        make_folder(self.folder)
         times = nanoseconds(telemetry)
         described = {"name": telemetry.name, "unit": telemetry.unit, "start": telemetry.start or ""}
         described |= {key: repr(getattr(telemetry, key)) for key in ("interval_s", "offset_s")}
@@ -64,9 +62,6 @@ class ParquetStore:
         Raises:
             InputError: If there is no such series, or if samples are missing from it.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         files = sorted(self._channel(name).glob("*.parquet"))
         if not files:
             raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")

@@ -12,17 +12,11 @@ _SAME = 1e-6  # values closer than this share of their range are one level: the 
 
 @dataclasses.dataclass(frozen=True)
 class Levels:
-    """Evenly spaced levels of a quantised channel.
+    """Evenly spaced levels of a quantised channel."""
 
-    Args:
-        step: Distance between neighbouring levels, in the unit of the telemetry.
-        origin: One of the levels.
-        count: Number of levels that occur.
-    """
-
-    step: float
-    origin: float
-    count: int
+    step: float  # distance between neighbouring levels, in the unit of the telemetry
+    origin: float  # one of the levels
+    count: int  # number of levels that occur
 
     @classmethod
     def find(cls, values: np.ndarray) -> "Levels | None":

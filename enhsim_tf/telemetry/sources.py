@@ -15,6 +15,7 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
+from enhsim_tf.telemetry.influx_store import InfluxStore
 from enhsim_tf.telemetry.pandas_series import from_series, to_series
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.reading.channels import read_table_channels
@@ -90,8 +91,6 @@ def _exists(path: Path) -> bool:
 
 def _read_influx(source: str, columns: list[str] | None, time: str | None) -> dict[str, pd.Series]:
     """Reads the series written by an `InfluxStore`, or otherwise the one series at the address, named after its field."""
-    from enhsim_tf.telemetry.influx_store import InfluxStore  # the client is an optional extra
-
     if time is not None:
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {source}. Leave it out.")
     store = InfluxStore(source)
@@ -107,10 +106,6 @@ def _read_influx(source: str, columns: list[str] | None, time: str | None) -> di
 
 def _read_folder(folder: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
     """Reads the tables in a folder, or the series of a `ParquetStore`."""
-    if (folder / "labeled_anomalies.csv").is_file():
-        raise InputError(
-            f"Expected a store's folder. Received: {folder}, which holds labelled channels. Name one array, such as train/T-1.npy, and column 0."
-        )
     if files_of(folder):  # a store has only folders inside
         return read_table_channels(folder, columns, time, options)
     if time is not None:

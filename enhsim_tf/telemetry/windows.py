@@ -91,11 +91,7 @@ def disjoint_rows(starts: np.ndarray, window: int) -> np.ndarray:
 
 
 def runs_of(marks: np.ndarray) -> list[tuple[int, int]]:
-    """Returns the first sample and the end (exclusive) of each run of true samples.
-
-    Args:
-        marks: Boolean array of shape `(samples,)`.
-    """
+    """Returns the first sample and the end (exclusive) of each run of true samples, of marks of shape `(samples,)`."""
     edges = np.flatnonzero(np.diff(np.asarray(marks, bool), prepend=False, append=False))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -103,13 +99,8 @@ def runs_of(marks: np.ndarray) -> list[tuple[int, int]]:
 def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
     """Converts scores of windows to scores of samples: the mean score of the windows that contain a sample.
 
-    Samples after the end of the last window receive the score of the last window.
-
-    Args:
-        scores: Score of each window, shape `(windows,)`.
-        begins: First sample of each window, in ascending order from 0, with steps of at most `window`.
-        window: Number of samples in a window.
-        num_samples: Length of the series, and of the result.
+    Samples after the end of the last window receive the score of the last window. Windows begin at `begins`, in ascending order from 0,
+    with steps of at most `window`.
     """
     steps = np.zeros((2, num_samples + 1))
     for sign, places in ((1, begins), (-1, begins + window)):

@@ -54,16 +54,6 @@ def test_a_folder_is_made_with_its_parents_and_refused_in_place_of_a_file(tmp_pa
     assert content_of(folder) == {"taken": "x"}
 
 
-def test_replace_file_renames_only_at_the_end(tmp_path):
-    path = tmp_path / "values.json"
-    path.write_text("old")
-    with replace_file(path) as temporary:
-        temporary.write_text("new")
-        assert path.read_text() == "old"
-        assert temporary.parent == path.parent and temporary.suffix == ".json"
-    assert content_of(tmp_path) == {"values.json": "new"}
-
-
 @pytest.mark.parametrize("before", ["nothing", "a folder", "a file", "a link"])
 def test_replace_folder_replaces_whatever_is_there(tmp_path, before):
     path = tmp_path / "above" / "model"
@@ -177,13 +167,6 @@ for number in range(50):
     writers = [subprocess.Popen([sys.executable, "-c", script, str(tmp_path / "model"), name], cwd=ROOT) for name in ("x", "y", "z")]
     assert [writer.wait() for writer in writers] == [0, 0, 0]
     assert len(set(content_of(tmp_path).values())) == 1 and names_in(tmp_path) == ["model"]
-
-
-def test_the_longest_name_still_allows_two_temporary_suffixes(tmp_path):
-    path = tmp_path / atomic_files.encode_name("a" * 160)
-    with replace_folder(path) as outer, replace_folder(outer) as inner, replace_file(inner / "settings.json") as temporary:
-        temporary.write_text("{}")
-    assert (path / "settings.json").read_text() == "{}"
 
 
 def test_json_without_nan_and_its_checksum(tmp_path):

@@ -31,13 +31,6 @@ def test_the_users_choice_of_kernels_wins(value, is_on):
     assert run(START + STATE, TF_ENABLE_ONEDNN_OPTS=value).stdout == f"{is_on},tensorflow\n"
 
 
-@pytest.mark.slow
-def test_settings_that_mean_nothing_do_no_harm():
-    names = ("TF_ENABLE_ONEDNN_OPTS", "TF_NUM_INTRAOP_THREADS", "TF_CPP_MIN_LOG_LEVEL", "MALLOC_TRIM_THRESHOLD_", "GLIBC_TUNABLES")
-    ended = run(START + "print(float(tf.reduce_sum(tf.ones((3, 3)) @ tf.ones((3, 3)))))", **dict.fromkeys(names, "x"))
-    assert (ended.stdout, ended.stderr, ended.returncode) == ("27.0\n", "", 0)
-
-
 REFUSED = "from enhsim_tf.common.errors import InputError\ntry:\n    import enhsim_tf.common.backend\nexcept InputError as error:\n    print(error)"
 
 

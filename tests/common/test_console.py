@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from enhsim_tf.common.console import SILENT, Progress
@@ -27,12 +26,6 @@ def test_a_line_is_printed_at_once_in_the_characters_of_the_encoding(encoding, p
     assert (ended.stdout.decode(encoding), ended.stderr) == (printed, b"")
 
 
-def test_a_progress_bar_of_a_terminated_process_causes_no_semaphore_warning():
-    script = "import os\nfrom enhsim_tf.common.console import progress\nfor _ in progress(range(3), disable=True): pass\nos._exit(0)"
-    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
-    assert (ended.stdout, ended.stderr) == ("", "")
-
-
 # -- progress --------------------------------------------------------------------------------------------------------------
 
 
@@ -48,18 +41,6 @@ class Clock:
         for done in steps:
             self.now += seconds
             loop(done)
-
-
-def test_the_lines_of_a_loop_of_known_speed():
-    told, clock = [], Clock()
-    loop = Progress(told.append, "noise GAN    ", clock).loop("iteration", 1_200)
-    clock.walk(loop, range(1, 1_201), 0.0625)  # 75 s in all; fifteen of them end with 240 iterations
-    assert told == [
-        "noise GAN    iteration 240 of 1,200, 20 %, about 60 s left",
-        "noise GAN    iteration 480 of 1,200, 40 %, about 45 s left",
-        "noise GAN    iteration 720 of 1,200, 60 %, about 30 s left",
-        "noise GAN    iteration 960 of 1,200, 80 %, about 15 s left",
-    ]
 
 
 def test_a_slow_first_step_is_excluded_from_the_estimate():
@@ -109,14 +90,3 @@ def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
     last = {match[1]: match.group(2, 3) for line in done.stdout.splitlines() if (match := SPOKEN.fullmatch(line))}
     # the last epoch and the last records are reported by the end of the stage
     assert last == {"enhancer     epoch": ("1", "2"), "noise GAN    iteration": ("35", "40")}
-
-
-@pytest.mark.slow
-def test_fitting_processes_name_their_channel(tmp_path, environment):
-    values = np.sin(2 * np.pi * np.arange(1_200) / 40) + 0.1 * np.random.default_rng(0).standard_normal((2, 1_200))
-    pd.DataFrame({"t": np.arange(1_200), "volts": values[0], "amperes": values[1]}).to_csv(tmp_path / "x.csv", index=False)
-    command = [sys.executable, "-m", "enhsim_tf", "fit", "x.csv", "--out", "models", "--separately", "--workers", "2"]
-    command += ["--num-windows", "60", "--noise", "gaussian", "--enhancer", "ridge"]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=600)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert {f"{name}: enhancer ridge ..." for name in ("volts", "amperes")} <= set(done.stdout.splitlines())

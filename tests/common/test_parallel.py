@@ -26,7 +26,7 @@ def test_every_item_is_computed_once_in_single_threaded_processes():
 
 
 def test_threads_are_set_before_the_work_imports_anything():
-    assert list(engines.run("local", threads_of, [1], 1, threads=2)) == [("2", {1})]
+    assert list(engines.run("local", threads_of, [1], 1)) == [("1", {1})]
 
 
 def test_items_are_drawn_only_when_workers_can_take_them():
@@ -108,7 +108,7 @@ def test_ray_gives_the_same_results_and_replaces_killed_processes(tmp_path, monk
                 for process in os.listdir(tmp_path / "met"):
                     os.kill(int(process), signal.SIGKILL)
         assert sorted(found) == list(range(60)) and len(os.listdir(tmp_path / "met")) > 8
-        assert list(engines.run("ray", threads_of, [1], 1, threads=2)) == [("2", {1})]
+        assert list(engines.run("ray", threads_of, [1], 1)) == [("1", {1})]
         with refused("another number"):
             list(engines.run("ray", refuse, range(5), 1))
         with refused("died in a row"):

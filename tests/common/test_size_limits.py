@@ -6,7 +6,6 @@ import os
 import resource
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +26,7 @@ def npy(path, descr, shape, content=b""):
     return path
 
 
-@pytest.mark.parametrize(
-    "array", [np.arange(6.0), np.asfortranarray(np.arange(6).reshape(2, 3)), np.zeros(0), np.array(["a", "ß"]), np.array(1)]
-)
+@pytest.mark.parametrize("array", [np.arange(6.0), np.asfortranarray(np.arange(6).reshape(2, 3)), np.zeros(0), np.array(1)])
 def test_an_array_is_read_as_it_was_written(tmp_path, array):
     np.save(tmp_path / "x.npy", array)
     found = load_npy(tmp_path / "x.npy")
@@ -46,29 +43,15 @@ def test_an_array_is_read_as_it_was_written(tmp_path, array):
         ("<f8", (61,), "greater than file"),
         ("<f8", (10**30,), "too large"),
         ("<f8", (-1,), "negative"),
-        ("|S0", (10**12,), "no size"),
+        ("|S0", (10**12,), "no numbers"),
         ("|O", (60,), "objects"),
-        ("<U2", (60,), "Unicode"),
+        ("<U2", (60,), "no numbers"),
+        ([("a", "<f8")], (60,), "no numbers"),
     ],
 )
 def test_an_array_with_a_wrong_header_is_refused(tmp_path, descr, shape, word):
     with pytest.raises(ValueError, match=word):
         load_npy(npy(tmp_path / "x.npy", descr, shape, b"\xff" * 480))
-
-
-def test_an_archive_with_too_large_arrays_is_refused(tmp_path):
-    np.savez_compressed(tmp_path / "x.npz", value=np.zeros(10**7))
-    assert (tmp_path / "x.npz").stat().st_size < 10**6
-    with pytest.raises(ValueError, match="more than 1,000,000 bytes"):
-        load_npz(tmp_path / "x.npz", 10**6)
-
-
-@pytest.mark.parametrize("shape", [(10**12,), (10**6,), (-3,)])
-def test_an_array_in_an_archive_must_have_the_declared_size(tmp_path, shape):
-    with zipfile.ZipFile(tmp_path / "x.npz", "w") as archive:
-        archive.writestr("value.npy", npy(tmp_path / "x.npy", "<f8", shape, bytes(32)).read_bytes())
-    with pytest.raises(ValueError, match="EOF|allocate|memory|negative"):
-        load_npz(tmp_path / "x.npz", 10**6)
 
 
 def repeated(num_rows, word=1.5):

@@ -1,6 +1,5 @@
 """Stages run once, are reused, run again when a dependency changes or the result is damaged, and are never left incomplete."""
 
-import json
 import os
 import shutil
 from pathlib import Path
@@ -144,12 +143,6 @@ def test_what_a_killed_run_left_is_cleared_away_by_the_next(work):
         shutil.copytree(temporary, half := temporary.with_name(temporary.name.replace("killed", "work")))
     assert half.is_dir()
     assert work.run() == (folder, True) and not half.exists()
-
-
-def test_the_time_that_it_took_is_kept(work):
-    first, again = (Stages(work.cache, tell=work.told.append) for _ in range(2))
-    folder = [each.run("work", work.make, ()) for each in (first, again)][0]
-    assert again.seconds == first.seconds == {"work": json.loads((folder / "stage.json").read_text())["seconds"]}
 
 
 def test_arrays_come_back_as_they_went(tmp_path):

@@ -98,10 +98,3 @@ def test_what_is_not_finite_is_neither_generated_nor_scored_nor_saved(kind, whic
     with refused(which, "not saved"):
         simulator.save(tmp_path / "model")
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", ["values of 1e-30", "one value of 1e30"])
-def test_a_simulator_of_runs_learns_no_channel_that_is_too_large_or_small(name, refused):
-    values, word = REFUSED[name]
-    with refused(word):
-        fit(channel(values), RUN, FitOptions(window=64))

@@ -87,17 +87,6 @@ def test_a_lesson_runs_and_its_solutions_are_right(source, cache):
     assert said == {False: {NOT_ANSWERED}, True: {RIGHT}}
 
 
-def test_a_solution_is_run_after_the_check_that_it_belongs_to():
-    texts = ["check_answer(a, bool, '')", "b = None", "check_answer(b, bool, '')"]
-    folded = nbformat.v4.new_markdown_cell("<details>\n\n```python\na = 1\n```\n\n```python\nb = 2\n```\n\n</details>")
-    notebook = nbformat.v4.new_notebook(cells=[*map(nbformat.v4.new_code_cell, texts), folded])
-    build.solve(notebook)
-    solved = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
-    assert solved == [texts[0], "a = 1\n", texts[0], "b = None", texts[2], "b = 2\n", texts[2]]
-    with pytest.raises(ValueError, match="0 for 1"):
-        build.solve(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(texts[0])]))
-
-
 # -- for students, and outside a clone ---------------------------------------------------------------------------------------
 
 ADDRESS = "https://github.com/someone/something"

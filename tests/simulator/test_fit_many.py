@@ -64,7 +64,7 @@ def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
 def test_a_channel_that_kills_its_worker_is_reported_and_stops_no_other(tmp_path, monkeypatch):
     tried = []
 
-    def run(engine, work, jobs, workers, threads):
+    def run(engine, work, jobs, workers):
         tried.append(([job.name for job in jobs], workers))
         for place, job in enumerate(jobs):
             if job.name == "bad":

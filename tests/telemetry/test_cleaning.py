@@ -121,6 +121,12 @@ REPAIRED = {
     "pandas' NA": (set_rows([7], pd.NA, "Float64"), {}, {"missing values": 1, "gaps filled": 1}, linear([7])),
     "empty text": (set_rows([7, 50], ["", " "]), {}, {"missing values": 2, "gaps filled": 2}, linear([7, 50])),
     "words for nothing": (set_rows([7, 50, 90], ["nan", "N/A", "NULL"]), {}, {"missing values": 3, "gaps filled": 3}, linear([7, 50, 90])),
+    "a word of this source for nothing": (
+        set_rows([7], "offline"),
+        {"missing_values": "offline"},
+        {"missing words": 1, "missing values": 1, "gaps filled": 1},
+        linear([7]),
+    ),
     "rows missing": (CLEAN.drop(TIMES[[7, 8, 50]]), {}, {"gaps filled": 2}, linear([7, 8, 50])),
     "numbers as text with spaces": (with_times(TIMES, [f" {word}\t" for word in WORDS]), {}, {}),
     "decimal commas": (with_times(TIMES, [word.replace(".", ",") for word in WORDS]), {}, {"decimal comma": N}),

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry import influx_store
 from enhsim_tf.telemetry.influx_client import VARIABLES
 from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore
 from enhsim_tf.telemetry.pandas_series import to_series
@@ -275,8 +276,9 @@ def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, b
         assert asked.call_count >= 3, "for the series, for the points, and for those behind the break"
 
 
-def test_the_old_series_stays_until_the_new_one_is_complete(mortal, bucket, refused):
-    store, old, new = InfluxStore(_location(bucket), batch_size=100, max_retry_s=0.5), wheel(1_000), wheel(2_000, seed=1)
+def test_the_old_series_stays_until_the_new_one_is_complete(mortal, bucket, refused, monkeypatch):
+    monkeypatch.setattr(influx_store, "BATCH", 100)
+    store, old, new = InfluxStore(_location(bucket), max_retry_s=0.5), wheel(1_000), wheel(2_000, seed=1)
     store.write(old)
     send, sent = store.server.send, []
 

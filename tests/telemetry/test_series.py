@@ -52,13 +52,6 @@ def test_bad_values_are_refused(refused, name):
         check_values(values, "here", min_samples=10)
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".csv", ".parquet"])
-@pytest.mark.parametrize(("values", "words"), [(with_one(np.nan), "1 (first: "), (np.full(12, 3.5), "3.5"), (RAMP[:9], "at least 10")])
-def test_bad_values_of_a_file_are_refused(tmp_path, refused, suffix, values, words):
-    with refused(words, f"series{suffix}"):
-        read_telemetry(write(tmp_path / f"series{suffix}", values), min_samples=10)
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.int64, np.float16, np.float64])
 def test_numbers_of_any_kind_become_float32(dtype):
     values = check_values(np.array([0, 1, 1, 0]).astype(dtype), "here")

@@ -138,9 +138,6 @@ def test_the_series_of_a_store(tmp_path, refused):
     (tmp_path / "empty").mkdir()
     with refused("without any"):
         read_source(tmp_path / "empty")
-    (tmp_path / "empty" / "labeled_anomalies.csv").touch()
-    with refused("train/T-1.npy"):
-        read_source(tmp_path / "empty")
 
 
 def test_influxdb_refuses_a_time_column_and_an_incomplete_location(monkeypatch, refused):

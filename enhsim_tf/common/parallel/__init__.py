@@ -1,4 +1,1 @@
-"""Parallel work: calls a function for many items, in processes of this machine or of a Ray cluster.
-
-This package depends on neither telemetry nor files.
-"""
+"""Parallel work: calls a function for many items, in processes of this machine or of a Ray cluster."""

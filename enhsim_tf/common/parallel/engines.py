@@ -1,7 +1,7 @@
 """Engines that call a function for many items in several processes.
 
-Each process uses a fixed number of threads, so that results do not depend on the number of cores. A process that dies is
-replaced and its item is computed again. An engine gives up after more than five consecutive worker failures.
+Each process uses one thread, so that results do not depend on the number of cores. A process that dies is replaced and its item is
+computed again. An engine gives up after more than five consecutive worker failures.
 """
 
 import pickle
@@ -15,7 +15,7 @@ from enhsim_tf.common.parallel.ray import run_ray
 ENGINES = {"local": 512, "ray": 10_000}  # name: maximum number of workers
 
 
-def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: int | None = None, threads: int = 1) -> Iterator[Any]:
+def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: int | None = None) -> Iterator[Any]:
     """Calls `work` for each item and yields the results in the order in which they are finished.
 
     Args:
@@ -24,7 +24,6 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
         items: Arguments of `work`, none of which may be None. They are drawn and pickled only when a worker can take them, so
             that memory does not grow with their number.
         workers: Number of processes. None: one per CPU.
-        threads: Number of TensorFlow threads in each process. Linear algebra libraries use one thread.
 
     Yields:
         The result of `work` for each item.
@@ -35,7 +34,7 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
     if engine not in ENGINES:
         raise InputError(f"Expected an engine, one of: {', '.join(ENGINES)}. Received: {engine!r}.")
     _check_workers(engine, workers)
-    return {"local": run_local, "ray": run_ray}[engine](pickle.dumps(work), threads, iter(items), workers)
+    return {"local": run_local, "ray": run_ray}[engine](pickle.dumps(work), iter(items), workers)
 
 
 def _check_workers(engine: str, workers: int | None) -> None:
@@ -44,14 +43,7 @@ def _check_workers(engine: str, workers: int | None) -> None:
 
 
 def parse_workers(text: str | None, engine: str | None = None) -> int | None:
-    """Parses the option `--workers auto|N`, for the engine `local` if none is given.
-
-    Returns:
-        The number of workers, or None for one per CPU.
-
-    Raises:
-        InputError: If the value is neither `auto` nor a positive integer, or if they are too many for the engine.
-    """
+    """Parses the option `--workers auto|N`, for the engine `local` if none is given: a number, or None for one per CPU."""
     if text in (None, "auto"):
         return None
     if not (text.isascii() and text.isdecimal() and 1 <= len(text) <= 9 and int(text)):

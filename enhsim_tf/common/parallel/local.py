@@ -37,11 +37,11 @@ class ProcessesDiedError(InputError):
         self.items = tuple(items)
 
 
-def run_local(work: bytes, threads: int, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
+def run_local(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
     """Implements `engines.run` with processes of this machine; `work` is pickled."""
     num_processes, retry, failures = workers or num_cpus(), collections.deque(), 0
     while failures <= MAX_FAILURES:
-        with _pool(work, threads, num_processes) as pool:  # it starts a process when an item is submitted and none is idle
+        with _pool(work, num_processes) as pool:  # it starts a process when an item is submitted and none is idle
             running: dict[concurrent.futures.Future, Any] = {}
             try:
                 while True:
@@ -80,10 +80,10 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, retry: coll
 
 
 @contextlib.contextmanager
-def _pool(work: bytes, threads: int, workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
+def _pool(work: bytes, workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
     """A pool of spawned processes that is terminated at once if the block raises. Forking is not used, since TensorFlow hangs."""
     others = set(multiprocessing.active_children())
-    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _start_pool_worker, (work, threads))
+    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _start_pool_worker, (work,))
     is_done = False
     try:
         yield pool
@@ -95,13 +95,13 @@ def _pool(work: bytes, threads: int, workers: int) -> Iterator[concurrent.future
 
 
 @functools.lru_cache(1)
-def start_worker(work: bytes, threads: int) -> Callable[[Any], Any]:
+def start_worker(work: bytes) -> Callable[[Any], Any]:
     """Prepares a process of any engine, and returns the unpickled function.
 
     The thread counts are set before `work` is unpickled, because unpickling imports the libraries that read them.
     """
-    one = dict.fromkeys(("TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    os.environ |= one | {"TF_NUM_INTRAOP_THREADS": str(threads), "CUDA_VISIBLE_DEVICES": ""}
+    numbers = "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
+    os.environ |= dict.fromkeys(numbers, "1") | {"CUDA_VISIBLE_DEVICES": ""}
     function = pickle.loads(work)
     import threadpoolctl
 
@@ -109,9 +109,9 @@ def start_worker(work: bytes, threads: int) -> Callable[[Any], Any]:
     return function
 
 
-def _start_pool_worker(work: bytes, threads: int) -> None:
+def _start_pool_worker(work: bytes) -> None:
     global _work
-    _work = start_worker(work, threads)
+    _work = start_worker(work)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

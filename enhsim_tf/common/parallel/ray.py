@@ -18,15 +18,15 @@ _ANSWER_S = 10
 _REFUSALS = (ConnectionError, RuntimeError, OSError, ValueError)
 
 
-def _call(work: bytes, threads: int, item: Any) -> tuple[str, Any]:
+def _call(work: bytes, item: Any) -> tuple[str, Any]:
     """Returns `("done", result)`, or `("refused", message)` after an `InputError`, which Ray would wrap in an error of its own."""
     try:
-        return "done", start_worker(work, threads)(item)
+        return "done", start_worker(work)(item)
     except InputError as error:
         return "refused", str(error)
 
 
-def run_ray(work: bytes, threads: int, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
+def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
     """Implements `engines.run` with Ray tasks, of which `workers` run at a time, or one per CPU of the cluster; `work` is pickled."""
     first = next(items, None)
     if first is None:
@@ -39,7 +39,7 @@ def run_ray(work: bytes, threads: int, items: Iterator[Any], workers: int | None
         try:
             while True:
                 while item is not None and len(running) < 2 * number:
-                    running[call.remote(work, threads, item)] = item
+                    running[call.remote(work, item)] = item
                     item = next(items, None)
                 if not running:
                     return

@@ -116,7 +116,7 @@ def _without(cells: pd.Series, missing_values: Sequence[float | str]) -> tuple[p
     numbers_of = [float(word) for word in words if re.fullmatch(f"{_NUMBER}|{_INFINITE}", word)]
     found = pd.to_numeric(cells, errors="coerce").isin(numbers_of).to_numpy(bool)
     if cells.dtype == object:
-        found |= cells.map(lambda cell: isinstance(cell, str) and cell.strip() in words).to_numpy(bool)
+        found = found | cells.map(lambda cell: isinstance(cell, str) and cell.strip() in words).to_numpy(bool)
     if not found.any():
         return cells, []
     text = f"values that mean no value ({', '.join(sorted(words))}), taken as missing: {found.sum():,}"

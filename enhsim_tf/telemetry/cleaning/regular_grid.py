@@ -12,6 +12,7 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
+from enhsim_tf.telemetry.windows import runs_of
 
 _ALIKE = (0.8, 1.25)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
 _RUN = 4  # smallest number of consecutive steps that form a stretch with another rate
@@ -20,17 +21,11 @@ _LEAST_REGULAR = 0.4  # share of the steps that are whole numbers of intervals; 
 
 @dataclasses.dataclass
 class Rows:
-    """The rows that are still in use, in chronological order. All arrays have the shape `(rows,)`.
+    """The rows that are still in use, in chronological order. All arrays have the shape `(rows,)`."""
 
-    Args:
-        times: Times in nanoseconds, int64.
-        values: Values, float64; a missing value is NaN or infinite.
-        source_row: Number of the row in the source.
-    """
-
-    times: np.ndarray
-    values: np.ndarray
-    source_row: np.ndarray
+    times: np.ndarray  # int64 nanoseconds
+    values: np.ndarray  # float64; a missing value is NaN or infinite
+    source_row: np.ndarray  # number of the row in the source
 
     def __len__(self) -> int:
         return len(self.times)
@@ -42,17 +37,11 @@ class Rows:
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """Regular samples without a gap.
+    """Regular samples without a gap. Both arrays have the shape `(samples,)`."""
 
-    Args:
-        begin: Time of the first sample in nanoseconds, a float because the grid need not lie on whole nanoseconds.
-        values: float64 array of shape `(samples,)`.
-        source_row: For each sample, its row in the source. A filled sample has the number of the last row before it.
-    """
-
-    begin: float
-    values: np.ndarray
-    source_row: np.ndarray
+    begin: float  # time of the first sample in nanoseconds, which need not be whole ones
+    values: np.ndarray  # float64
+    source_row: np.ndarray  # row of each sample in the source; of a filled one, the last row before it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,14 +55,7 @@ class _Segment:
 
 
 def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> tuple[list[Part], int, float]:
-    """Turns rows into regular parts.
-
-    Args:
-        rows: The rows.
-        bad: Mask of the source rows whose value cannot be read.
-        log: The cleaning log. If it has no times, samples are counted.
-        name: Channel name, for messages.
-        options: How problems are treated.
+    """Turns rows into regular parts; `bad` marks the source rows whose value cannot be read.
 
     Returns:
         The parts, the number of rows that their samples represent, and the interval in nanoseconds.
@@ -118,10 +100,7 @@ def find_interval(times: np.ndarray) -> float:
 
 
 def _refined(times: np.ndarray, interval: float) -> float:
-    """Refines the interval on the longest run without long gaps.
-
-    The result is the step that at least 90 % of the rows have, or otherwise the slope of a line fitted to the times.
-    """
+    """Refines the interval on the longest run without long gaps: the step that 90 % of the rows have, or the slope of a fitted line."""
     steps = np.diff(times).astype(np.float64)
     numbers = np.round(steps / interval)
     near = (numbers >= 1) & (numbers <= 3)
@@ -142,10 +121,7 @@ def _refined(times: np.ndarray, interval: float) -> float:
 
 
 def _longest_run(marks: np.ndarray) -> tuple[int, int]:
-    """Start and end index (exclusive) of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], marks.view(np.int8), [0]]))).reshape(-1, 2)
-    first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])] if len(edges) else (0, 0)
-    return int(first), int(last)
+    return max(runs_of(marks), key=lambda run: run[1] - run[0], default=(0, 0))
 
 
 def regular_step_fraction(times: np.ndarray, interval: float) -> float:

@@ -57,25 +57,15 @@ ROWS = Places()
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """One entry of the cleaning log.
+    """One entry of the cleaning log."""
 
-    Args:
-        kind: One of `KINDS`.
-        count: Number of rows, samples, gaps or stretches, as `text` says.
-        text: What was found and what was done about it.
-        places: The first few places where it was found.
-        rows_left_out: Number of rows that are not represented by a sample.
-        samples_filled: Number of samples that do not represent a row.
-        details: Further numbers, in plain JSON types.
-    """
-
-    kind: str
-    count: int
-    text: str
-    places: tuple[str, ...] = ()
-    rows_left_out: int = 0
-    samples_filled: int = 0
-    details: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    kind: str  # one of `KINDS`
+    count: int  # of rows, samples, gaps or stretches, as `text` says
+    text: str  # what was found and what was done about it
+    places: tuple[str, ...] = ()  # the first few where it was found
+    rows_left_out: int = 0  # rows that are not represented by a sample
+    samples_filled: int = 0  # samples that do not represent a row
+    details: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # further numbers, in plain JSON types
 
     @property
     def action(self) -> str:
@@ -99,25 +89,15 @@ def finding_from_dict(content: Mapping[str, Any]) -> Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """The report of cleaning one channel.
-
-    Args:
-        channel: Name of the channel.
-        rows_in: Number of rows in the source.
-        rows_used: Number of rows that are represented by a sample of the result.
-        samples: Number of samples in the result, over all parts.
-        num_parts: Number of parts.
-        interval_s: Sampling interval of the result in seconds, or in samples if the source has no times.
-        findings: The entries of the cleaning log.
-    """
+    """The report of cleaning one channel."""
 
     channel: str
-    rows_in: int
-    rows_used: int
-    samples: int
+    rows_in: int  # rows in the source
+    rows_used: int  # rows that are represented by a sample of the result
+    samples: int  # samples in the result, over all parts
     num_parts: int
-    interval_s: float
-    findings: tuple[Finding, ...]
+    interval_s: float  # sampling interval of the result in seconds, or in samples if the source has no times
+    findings: tuple[Finding, ...]  # the entries of the cleaning log
 
     @property
     def rows_left_out(self) -> int:
@@ -165,11 +145,7 @@ def lines_of(reports: Sequence[Report]) -> list[str]:
 class CleaningLog:
     """The log of cleaning actions: collects findings with their places in the source.
 
-    Args:
-        times: Times of all rows in the order of the source, int64 nanoseconds since 1970. None: the source has no times.
-        findings: Findings made when the source was read.
-        places: Where the rows are in their files.
-        counts: Whether the times count from a zero of their own and are no dates.
+    `times` are those of all rows in the order of the source, int64 nanoseconds since 1970, or None; `counts` as in `times.Times`.
     """
 
     def __init__(self, times: np.ndarray | None, findings: Sequence[Finding] = (), places: Places = ROWS, counts: bool = False):
@@ -184,14 +160,9 @@ class CleaningLog:
         return f"{self.places.of(row)}, {time}"
 
     def add(self, kind: str, rows: Sequence[int] | np.ndarray, text: str, count: int | None = None, **numbers: Any) -> None:
-        """Adds a finding, unless its count is 0.
+        """Adds a finding made at rows of the source, unless its count, by default the number of these rows, is 0.
 
-        Args:
-            kind: One of `KINDS`.
-            rows: Rows of the source where it was found. The first few are named.
-            text: What was found and what was done; `{count}` in it becomes the count.
-            count: The count. None: the number of `rows`.
-            **numbers: The other fields of the `Finding`.
+        `{count}` in the text becomes the count; `numbers` are the other fields of the `Finding`.
         """
         count = len(rows) if count is None else count
         if count:

@@ -36,21 +36,13 @@ _DAY_MONTH = re.compile(rf"(?P<first>\d\d?)(?P<mark>[./-])(?P<second>\d\d?)(?P=m
 
 @dataclasses.dataclass(frozen=True)
 class Times:
-    """Parsed times.
+    """Parsed times."""
 
-    Args:
-        stamps: Times with NaT where missing, in UTC if the source says so and without a zone otherwise.
-        bad: Mask of the times that could not be parsed.
-        form: How the times are written, for the report.
-        zone: The zone that the source states, for the report; empty if it states none.
-        counts: Whether the times count from a zero of their own and are no dates.
-    """
-
-    stamps: pd.DatetimeIndex
-    bad: np.ndarray
-    form: str = "dates"
-    zone: str = ""
-    counts: bool = False
+    stamps: pd.DatetimeIndex  # NaT where missing, in UTC if the source says so and without a zone otherwise
+    bad: np.ndarray  # mask of the times that could not be parsed
+    form: str = "dates"  # how they are written, for the report
+    zone: str = ""  # that the source states, for the report; empty if it states none
+    counts: bool = False  # whether they count from a zero of their own and are no dates
 
 
 def parse_times(times: Any, what: str, drop: bool = False, form: str | None = None, places: Places = ROWS) -> Times:

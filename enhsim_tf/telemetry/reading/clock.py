@@ -3,9 +3,9 @@
 Dates win, then durations, then numbers that increase and whose name speaks of time. Numbers that only look like a clock are never taken.
 """
 
-import dataclasses
 import re
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -47,14 +47,8 @@ _PARTS = {
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Clock:
-    """The clock of a table.
-
-    Args:
-        columns: Columns that make it up; none if samples are counted.
-        cells: Their content, one cell per row, to be parsed as times.
-    """
+class Clock(NamedTuple):
+    """The clock of a table: the columns that make it up, none if samples are counted, and one cell per row, to be parsed as times."""
 
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
@@ -106,11 +100,7 @@ def _is_epoch(values: np.ndarray) -> bool:
 def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str) -> Clock:
     """Finds the clock of a table; refuses one in which several columns may be it, or one of which only the values speak for it.
 
-    Args:
-        frame: The table.
-        kinds: Kind of each column, such as "numbers", "dates", "words".
-        numbers: Values of the columns of numbers that are not asked for as channels.
-        what: Description of the source, for messages.
+    `kinds` are those of `columns.lay_out`; `numbers` are the values of the columns of numbers that are not asked for as channels.
     """
     tells = {name: _name_tells(name)[0] for name in kinds}
     of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "times of day", "spans")}

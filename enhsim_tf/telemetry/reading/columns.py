@@ -31,34 +31,20 @@ _TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Layout:
-    """What the columns of a table are.
-
-    Args:
-        clock: The clock.
-        times: Its times; None if samples are counted.
-        channels: Columns of telemetry.
-        labels: Columns that label anomalous rows.
-        words: Columns of words, which may tell several series apart.
-        left_out: Names of the other columns by the kind of finding that reports them.
-    """
+    """What the columns of a table are."""
 
     clock: Clock
-    times: Times | None
+    times: Times | None  # of the clock; None if samples are counted
     channels: tuple[str, ...]
-    labels: tuple[str, ...]
-    words: tuple[str, ...]
-    left_out: Mapping[str, Sequence[str]]
+    labels: tuple[str, ...]  # which mark anomalous rows
+    words: tuple[str, ...]  # which may tell several series apart
+    left_out: Mapping[str, Sequence[str]]  # the other columns by the kind of finding that reports them
 
 
 def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Layout:
-    """Says what each column of a table is; raises an `InputError` if the clock cannot be told.
+    """Says what each column of a table, in which no name repeats, is; raises an `InputError` if the clock cannot be told.
 
-    Args:
-        table: The table; no name repeats.
-        columns: Columns that were asked for as channels, or None.
-        time: Name of the time column, `NO_TIME`, or None.
-        options: How columns and times are read.
-        what: Description of the source, for messages.
+    `columns` are those that were asked for as channels, and `time` is the name of the time column or `NO_TIME`.
     """
     frame, asked = table.frame, {*(columns or ()), *(options.value_column or ())}
     kinds = {name: _kind_of(frame[name]) for name in frame.columns}

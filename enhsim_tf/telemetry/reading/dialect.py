@@ -20,23 +20,14 @@ _SOLID = re.compile(f"(?:{_NUMBER}|{_DATE}|[+-]?inf(?:inity)?)$", re.IGNORECASE)
 
 @dataclasses.dataclass(frozen=True)
 class Dialect:
-    """How a text file is written.
-
-    Args:
-        separator: What separates columns.
-        names: Names of the columns; one without a name is called by its number.
-        first_line: Line at which the data begin, counted from 0.
-        skipped: Lines before the data that are neither names nor blank.
-        units: Cells of the line between the names and the data, where units stand, or none.
-        head: Cells of the first rows of data.
-    """
+    """How a text file is written."""
 
     separator: str
-    names: list[str]
-    first_line: int
-    skipped: int
-    head: list[list[str]]
-    units: Sequence[str] = ()
+    names: list[str]  # of the columns; one without a name is called by its number
+    first_line: int  # at which the data begin, counted from 0
+    skipped: int  # number of lines before the data that are neither names nor blank
+    head: list[list[str]]  # cells of the first rows of data
+    units: Sequence[str] = ()  # cells of the line between the names and the data, where units stand
 
 
 def decode(content: bytes) -> tuple[str, str, list[Finding]]:

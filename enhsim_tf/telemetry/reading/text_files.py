@@ -21,21 +21,13 @@ _ANNOTATION = re.compile(r"^#(?:group|datatype|default)\b", re.MULTILINE)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table:
-    """A table.
+    """A table as it was read."""
 
-    Args:
-        frame: The cells; columns have names of text, which may repeat.
-        places: Where the rows are in their files.
-        decimal: Decimal sign of numbers in text; None: each column shows its own.
-        findings: Findings for the cleaning log.
-        units: Cells of a line of units by the names of the columns.
-    """
-
-    frame: pd.DataFrame
-    places: Places = ROWS
-    decimal: str | None = None
-    findings: tuple[Finding, ...] = ()
-    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    frame: pd.DataFrame  # columns have names of text, which may repeat
+    places: Places = ROWS  # where the rows are in their files
+    decimal: str | None = None  # sign of numbers in text; None: each column shows its own
+    findings: tuple[Finding, ...] = ()  # for the cleaning log
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)  # cells of a line of units by column
 
 
 def table_of(frame: pd.DataFrame, dialect: Dialect, name: str, decimal: str | None, findings: Sequence[Finding]) -> Table:
@@ -71,19 +63,18 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     return table_of(frame, dialect, name, decimal, findings)
 
 
-def _stream_of(content: bytes, text: str, encoding: str, first_line: int) -> io.BytesIO | io.StringIO:
-    """Returns the data behind the header: the bytes of UTF-8, which pandas reads faster, otherwise text."""
+def _stream_of(content: bytes, text: str, encoding: str, first_line: int) -> io.BytesIO:
+    """Returns the data behind the header in UTF-8; content that is in UTF-8 is not copied."""
     is_plain = encoding == "utf-8" and b"\n" in content and not content.endswith(b"\x00")
-    whole: bytes | str = content if is_plain else text
-    end, place = (b"\n" if is_plain else "\n"), 0
+    whole, place = content if is_plain else text.encode(), 0
     for _ in range(first_line):
-        place = whole.find(end, place) + 1 or len(whole)
-    stream = io.BytesIO(content) if is_plain else io.StringIO(text)
+        place = whole.find(b"\n", place) + 1 or len(whole)
+    stream = io.BytesIO(whole)
     stream.seek(place)
     return stream
 
 
-def _read_rows(stream: io.BytesIO | io.StringIO, dialect: Dialect, name: str, decimal: str | None) -> tuple[pd.DataFrame, str | None]:
+def _read_rows(stream: io.BytesIO, dialect: Dialect, name: str, decimal: str | None) -> tuple[pd.DataFrame, str | None]:
     """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
     names = dialect.names
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
@@ -130,7 +121,7 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
             )
 
 
-def _parse(stream: io.BytesIO | io.StringIO, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
+def _parse(stream: io.BytesIO, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
     width, begin = len(dialect.names), stream.tell()
     options = {"sep": dialect.separator, "header": None, "names": range(width), "index_col": False, "low_memory": False}
     options |= {"skip_blank_lines": dialect.separator == BLANKS, "decimal": decimal or ".", "skipinitialspace": dialect.separator != "\t"}
