@@ -15,7 +15,6 @@ from studies.common import evaluation
 from studies.common.controls import CONTROLS
 from studies.common.example import Example
 from studies.common.settings import Settings
-from studies.robustness import real_floor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,14 +97,6 @@ class Replicate:
             chosen.num_anomalous if num_anomalous is None else num_anomalous,
             rate=chosen.false_alarm_rate,
         )
-
-    def floor(self) -> tuple[real_floor.RealFloor, np.ndarray]:
-        """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample, for measures of realism."""
-        every = (self.example.windows(part, None) for part in ("test", "train", "calibration"))
-        real, again, held_out = (windows["target"] - windows["truth"] for windows in every)
-        number = min(self.settings.robustness.num_windows, len(real), len(again), len(held_out))
-        floor = real_floor.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
-        return floor, held_out[:number]
 
     def arms(self, purpose: str) -> dict[str, np.ndarray]:
         """Windows of every arm.
