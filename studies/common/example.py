@@ -12,7 +12,7 @@ from enhsim_tf.paper import settings as of_paper
 from enhsim_tf.paper import telemetry as of_example
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.telemetry.series import Telemetry
-from studies.common.noise_gallery import GALLERY
+from studies.common.noise_processes import GALLERY
 from studies.common.settings import Settings
 
 
@@ -20,7 +20,7 @@ def draw_noise(kind: str, signal: np.ndarray, sd: float, rng: np.random.Generato
     """Draws noise.
 
     Args:
-        kind: Name of a process in `noise_gallery.GALLERY`.
+        kind: Name of a process in `noise_processes.GALLERY`.
         signal: The signal without noise, shape `(samples,)`, on which one of the processes depends.
         sd: Standard deviation of the noise.
         rng: Random generator.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.simulator.noise_choice import MAX_ALARM_EXCESS, MAX_RECALL_LOSS, CandidateJudgement, choose
-from studies.common.noise_gallery import LOOKED_AT
+from studies.common.noise_processes import LOOKED_AT
 from studies.common.tables import KeptTables
 
 if TYPE_CHECKING:

@@ -3,14 +3,8 @@
 import numpy as np
 import pytest
 
-from studies.common.environments import FAMILIES, NOISES
 from studies.common.example import draw_noise
-from studies.common.noise_gallery import GALLERY
 from studies.common.settings import make_settings
-
-
-def test_families_of_the_commands_are_those_of_the_gallery():
-    assert set(FAMILIES) == set(GALLERY) and set(NOISES) < set(FAMILIES)
 
 
 @pytest.mark.parametrize("noise", ["shot", "signal_dependent"])
