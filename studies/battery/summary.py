@@ -16,7 +16,6 @@ KEPT = KeptTables(
     ("errors", "choice", "trust", "speed", "runs", "alarms"),
     labels=("enhancer", "fault", "candidate", "what", "training", "detector", "regime"),
     digits=5,
-    kind="study",
     command="python -m studies.battery",
     digits_of={"speed": 9},
 )

@@ -22,7 +22,6 @@ class KeptTables:
         names: Names of the tables.
         labels: Columns with few distinct values, which are stored as dictionaries.
         digits: Decimals that numbers are rounded to.
-        kind: Word for messages: an `experiment` or a `study`.
         command: The command that produces them.
         digits_of: Decimals of tables that differ from `digits`.
     """
@@ -30,17 +29,11 @@ class KeptTables:
     names: tuple[str, ...]
     labels: tuple[str, ...]
     digits: int
-    kind: str
     command: str
     digits_of: Mapping[str, int] = dataclasses.field(default_factory=dict)
 
     def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
-        """Writes all tables: labels as dictionaries, and numbers rounded to the precision that their counts support.
-
-        Args:
-            tables: By name.
-            folder: An existing folder.
-        """
+        """Writes tables by name to a folder: labels as dictionaries, and numbers rounded to the precision that their counts support."""
         for name, table in tables.items():
             compact = table.reset_index(drop=True)
             for column in compact.columns:
@@ -61,7 +54,7 @@ class KeptTables:
 
         missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
         if missing:
-            raise InputError(f"Expected the tables of the {self.kind} in {folder}. Received: no {missing[0]}.parquet. Run {self.command}.")
+            raise InputError(f"Expected the tables of the study in {folder}. Received: no {missing[0]}.parquet. Run {self.command}.")
         tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in self.names}
         for table in tables.values():
             for column in set(self.labels) & set(table.columns):

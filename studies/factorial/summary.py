@@ -53,7 +53,7 @@ CONTRASTS = {
     "few, many": (Cell(FEW, RESIDUAL, RIDGE, WHOLE_WINDOWS).name, WITHOUT_NETWORK.name),
 }
 """Differences in false alarms and recall that the conclusions use: the first cell minus the second."""
-KEPT = KeptTables(("cells",), labels=("environment", "cell", "detector"), digits=4, kind="study", command="python -m studies.factorial")
+KEPT = KeptTables(("cells",), labels=("environment", "cell", "detector"), digits=4, command="python -m studies.factorial")
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:

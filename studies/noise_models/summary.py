@@ -17,7 +17,6 @@ KEPT = KeptTables(
     names=("detectors", "realism", "choice"),
     labels=("family", "model", "detector", "measure"),
     digits=4,
-    kind="study",
     command="python -m studies.noise_models",
 )
 MAX_REALISM_RATIO = 3.0  # of a measure to its value between two samples of real noise

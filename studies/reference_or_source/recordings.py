@@ -22,7 +22,7 @@ def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, prog
     """Simulates all runs of a seed and writes them to `runs.npz`.
 
     Args:
-        system: A system, see `run.make_system`.
+        system: A system, `aircraft.Aircraft` or `battery.Battery`.
         counts: Number of units of `fit`, `test`, `source`, of the telemetry that parameters are fitted to (`parameters`), and of a run
             under each fault (`fault`).
         seed: Seed of the commands.

@@ -27,7 +27,6 @@ KEPT = KeptTables(
     ("alarms", "recall", "degraded"),
     labels=("environment", "arm", "detector", "kind", "method", "mode"),
     digits=4,
-    kind="study",
     command="python -m studies.robustness",
     digits_of={"recall": 3},  # shares of 150 windows, in the largest table
 )

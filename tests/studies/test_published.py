@@ -6,7 +6,7 @@ import json
 import pytest
 
 from studies.common.command import PUBLISHED
-from studies.common.figures import save_all
+from studies.common.replicates import save_all
 
 STUDIES = ("battery", "few_windows", "noise_models", "spacecraft")
 

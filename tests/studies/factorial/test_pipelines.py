@@ -1,5 +1,6 @@
 """The cells have the signal and the noise that their names say, and those of the study of robustness where they agree."""
 
+import argparse
 import json
 
 import numpy as np
@@ -7,9 +8,9 @@ import pytest
 
 from enhsim_tf.common.stages import Stages
 from studies.common.settings import make_settings
+from studies.factorial.__main__ import run
 from studies.factorial.cells import CELLS, DETECTORS, REFERENCES, Cell
 from studies.factorial.pipelines import THRESHOLD, TRAINING, Pipelines
-from studies.factorial.run import run
 from studies.factorial.summary import KEPT
 from studies.robustness.replicate import Replicate
 
@@ -73,9 +74,10 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
         return [{"detector": name, "alarms": alarms, "windows": 59, "recall": 0.5, "recall_at_real_rate": 0.25} for name in DETECTORS]
 
     monkeypatch.setattr(Pipelines, "judged", judged)
-    found = run(make_settings("smoke", **SMALL), tmp_path / "cache", tmp_path, ["white", "shot"], False, lambda line: None)
+    options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
+    found = run(options, make_settings("smoke", **SMALL), tmp_path)
     table = KEPT.read(tmp_path)["cells"]
-    assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 2 * 34 * len(DETECTORS)
+    assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 34 * len(DETECTORS)
     assert not table.duplicated(["environment", "cell", "detector"]).any()
     assert found["cells"]["coarse"]["false_alarms"]["mean"] == pytest.approx(50 / 59)
     assert json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == found
