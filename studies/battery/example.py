@@ -50,12 +50,12 @@ def write_example(folder: Path, seed: int = SEED, num_orbits: int = NUM_ORBITS, 
     for number, fault, suffix in ((num_orbits, None, ""), (num_fault_orbits, FAULT, "_fault")):
         load = draw_load(number + 1, regime, loads)  # in the first orbit, which is left out, the battery reaches its usual temperature
         *planned, runs = simulate_all(load, regime, [fault] if fault is None else [None, fault], onset=2 * ORBIT_SAMPLES)
-        coarse, fine = (run.values[ORBIT_SAMPLES:] for run in runs)
+        coarse, fine = (run[ORBIT_SAMPLES:] for run in runs)
         times = np.arange(len(coarse)) * int(INTERVAL_S)
         simulator = in_columns(times, coarse)
         tables = {}
         if fault is not None:
-            tables["simulator_planned"] = in_columns(times, planned[0][0].values[ORBIT_SAMPLES:])
+            tables["simulator_planned"] = in_columns(times, planned[0][0][ORBIT_SAMPLES:])
             is_faulty = times >= ORBIT_SAMPLES * INTERVAL_S
             simulator["scenario"] = np.where(is_faulty, fault.kind, "nominal")
             simulator["severity"], simulator["mask"] = np.where(is_faulty, fault.severity, 0.0), is_faulty.astype(int)

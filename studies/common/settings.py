@@ -133,7 +133,6 @@ class BatterySettings:
     test_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days on which everything is judged", smoke=4)
     coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
     fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
-    paper_epochs: int = setting(40, "epochs", "paper, section 2.2", "40", smoke=1)
 
 
 @dataclasses.dataclass(frozen=True)

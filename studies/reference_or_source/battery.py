@@ -96,7 +96,7 @@ class Battery:
 
     def _run(self, model: Model, commands: np.ndarray, faults: Sequence[Fault | None]) -> list[np.ndarray]:
         found = simulate_all(commands[:, 0], REGIMES["gentle"], faults, [model])
-        return [runs[0].values[ORBIT_SAMPLES:] for runs in found]
+        return [runs[0][ORBIT_SAMPLES:] for runs in found]
 
     def can_simulate(self, simulator: str, kind: str) -> bool:
         """Whether a coarse simulator can express a kind of fault: heat transfer means nothing without a temperature."""
