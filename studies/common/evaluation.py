@@ -7,7 +7,7 @@ false-alarm rate over the nominal rate measures the gap between simulation and r
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -79,7 +79,6 @@ def evaluate_arm(
     detectors: Mapping[str, Callable[[int], Detector]],
     seed: int,
     num_blocks: int = 10,
-    on_detector: Callable[[int], None] | None = None,
 ) -> dict[str, list[dict]]:
     """Trains every detector on one arm and evaluates it on real telemetry.
 
@@ -90,14 +89,13 @@ def evaluate_arm(
         detectors: Maps a name to a factory, which takes a seed and returns an unfitted detector.
         seed: Seed for the detectors.
         num_blocks: Number of consecutive blocks of time for which false alarms are counted separately.
-        on_detector: Called after each detector with the number of completed detectors.
 
     Returns:
         The rows of two tables: `alarms` (detector, block, alarms, windows) and `recall` (detector, kind, severity, recall,
         recall_at_real_rate).
     """
     tables: dict[str, list[dict]] = {"alarms": [], "recall": []}
-    for done, (name, make) in enumerate(detectors.items(), 1):
+    for name, make in detectors.items():
         detector = make(seed).fit(training)
         limit = threshold(detector.score(held_out), trial.rate)
         nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
@@ -115,25 +113,7 @@ def evaluate_arm(
                     "recall_at_real_rate": recall_at_real_rate(reference, scores, trial.rate),
                 }
             )
-        if on_detector is not None:
-            on_detector(done)
     return tables
-
-
-def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:
-    """Computes the false-alarm rate of each detector.
-
-    Args:
-        rows: Rows of the table `alarms`, see `evaluate_arm`.
-
-    Returns:
-        A dictionary from the name of a detector to its false-alarm rate.
-    """
-    names = dict.fromkeys(row["detector"] for row in rows)
-    return {
-        name: sum(row["alarms"] for row in rows if row["detector"] == name) / sum(row["windows"] for row in rows if row["detector"] == name)
-        for name in names
-    }
 
 
 def cross_fitted_scores(make: Callable[[], Detector], windows: np.ndarray, starts: np.ndarray, num_folds: int) -> np.ndarray:

@@ -66,17 +66,12 @@ class Replicate:
         training, held_out = self.arms("arms, training"), self.arms("arms, threshold")
         rows: dict[str, list[dict]] = {name: [] for name in TABLES}
         told = self.stages.progress.loop("arm", len(ARMS))
-        for number, arm in enumerate(ARMS):
+        for done, arm in enumerate(ARMS, 1):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
-
-            def on_detector(done: float, before: int = number, of: int = len(detectors)) -> None:
-                told(before + done / of)
-
-            judged = evaluation.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
+            judged = evaluation.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed)
             for name in TABLES:
                 rows[name] += [{"arm": arm, **row} for row in judged[name]]
-            rates = evaluation.false_alarm_rates(judged["alarms"]).values()
-            self.stages.tell(f"  {arm:28} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
+            told(done)
         for name, each in rows.items():
             table = pd.DataFrame(each, columns=TABLES[name])
             table.assign(environment=self.settings.noise, seed=seed).to_parquet(folder / f"{name}.parquet")

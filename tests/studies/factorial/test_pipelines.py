@@ -92,7 +92,7 @@ def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_co
     coarse = one.arm("coarse", TRAINING)
     for cell, enhance in (
         (Cell("few", "moving average", "network", "paper's GAN"), one.example.enhance),
-        (Cell("many", "residual", "network", "autoregression"), one.second.simulator.enhance),
+        (Cell("many", "residual", "network", "autoregression"), one.second_network),
     ):
         rng = np.random.default_rng(int(one.example.draw(TRAINING).integers(2**31)))
         assert np.array_equal(one.arm(cell, TRAINING), enhance(coarse) + one.generator(cell).generate(len(coarse), rng))

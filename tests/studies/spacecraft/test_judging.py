@@ -5,6 +5,7 @@ import pytest
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import mean_over_windows
 from studies.spacecraft.judging import Judge
 from studies.spacecraft.reference import left_discord
 from studies.spacecraft.telemanom import LabelledChannel
@@ -37,6 +38,11 @@ def test_the_areas_of_a_perfect_and_of_a_random_score():
     random = judge.judge(np.random.default_rng(1).random(len(judge.begins)), own, own)
     assert perfect["auc_pr"] > 0.95  # the windows at its edges hold nominal samples, too
     assert random["auc_pr"] == pytest.approx(300 / 5_000, abs=0.05)  # the share of labelled samples
+
+
+def test_samples_behind_the_last_window_take_its_score():
+    scores = mean_over_windows(np.array([1.0, 3.0, 8.0]), np.array([0, 2, 4]), 4, 10)
+    assert scores.tolist() == [1, 1, 2, 2, 5.5, 5.5, 8, 8, 8, 8]
 
 
 def test_a_test_part_without_nominal_windows_is_refused():
