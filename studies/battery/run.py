@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from enhsim_tf.common.stages import Stages, load_arrays
 from studies.battery import record
 from studies.battery.orbits import REGIMES
-from studies.battery.simulate import check_installed
+from studies.battery.simulate import import_pybamm
 from studies.common.replicates import run_study
 from studies.common.settings import Settings
 
@@ -24,7 +24,7 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
     Raises:
         InputError: If PyBaMM is not installed.
     """
-    check_installed()
+    import_pybamm()
     versions = {"pybamm": importlib.metadata.version("pybamm")}
 
     def tables_of(regime: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":

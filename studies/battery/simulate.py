@@ -62,8 +62,12 @@ _REDUCTION, _MOST_REDUCTIONS = 0.9, 8  # after a failure of a solver, the curren
 
 
 @functools.cache
-def _pybamm() -> Any:
-    """Imports PyBaMM with its usage reports switched off, which it looks up when it is imported."""
+def import_pybamm() -> Any:
+    """Imports PyBaMM with its usage reports switched off, which it looks up when it is imported.
+
+    Raises:
+        InputError: If it is not installed.
+    """
     os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"
     try:
         import pybamm
@@ -74,11 +78,6 @@ def _pybamm() -> Any:
     pybamm.telemetry.disable()  # in case another module imported it first
     pybamm.set_logging_level("ERROR")
     return pybamm
-
-
-def check_installed() -> None:
-    """Raises an `InputError` if PyBaMM is not installed."""
-    _pybamm()
 
 
 def simulate(
@@ -99,7 +98,7 @@ def simulate(
     Raises:
         InputError: If PyBaMM is not installed.
     """
-    pybamm, clock = _pybamm(), np.arange(len(current)) * INTERVAL_S
+    pybamm, clock = import_pybamm(), np.arange(len(current)) * INTERVAL_S
     begun = onset * INTERVAL_S
     kinks = clock[np.flatnonzero(np.abs(np.diff(current, 2)) > _KINK_A) + 1]
     stops = np.unique(np.concatenate([[0.0], kinks, [time_s for time_s in (begun, begun + _ONSET_S) if time_s < clock[-1]], clock[-1:]]))
@@ -122,7 +121,7 @@ def simulate(
 
 def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float) -> Any:
     """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act from `begun` seconds."""
-    pybamm = _pybamm()
+    pybamm = import_pybamm()
     published = pybamm.ParameterValues("Chen2020")
     values, kelvins = published.copy(), regime.ambient_k if model.follows_ambient else _PUBLISHED_K
     charged = published.copy()

@@ -95,8 +95,8 @@ def test_a_threshold_comes_from_the_training_data():
 
 def test_without_pybamm_the_command_says_what_to_install(monkeypatch, capsys, tmp_path):
     monkeypatch.setitem(sys.modules, "pybamm", None)
-    simulate._pybamm.cache_clear()
+    simulate.import_pybamm.cache_clear()
     assert command(["--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "pip install 'enhsim_tf[battery]'" in line
-    simulate._pybamm.cache_clear()
+    simulate.import_pybamm.cache_clear()
