@@ -17,6 +17,8 @@ from enhsim_tf.detection.metrics import recall, threshold
 from enhsim_tf.telemetry.windows import time_blocks
 from studies.common.metrics import recall_at_real_rate
 
+_NUM_BLOCKS = 10  # consecutive blocks of time for which false alarms are counted separately
+
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
@@ -55,9 +57,6 @@ def make_trial(
         seed: Seed for the positions.
         num_anomalous: Number of anomalous windows for each kind and severity, evenly spaced over the nominal windows.
         rate: Nominal false-alarm rate of the thresholds.
-
-    Returns:
-        The trial.
     """
     chosen = nominal[np.linspace(0, len(nominal) - 1, min(num_anomalous, len(nominal))).astype(int)]
     durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
@@ -78,7 +77,6 @@ def evaluate_arm(
     trial: Trial,
     detectors: Mapping[str, Callable[[int], Detector]],
     seed: int,
-    num_blocks: int = 10,
 ) -> dict[str, list[dict]]:
     """Trains every detector on one arm and evaluates it on real telemetry.
 
@@ -88,7 +86,6 @@ def evaluate_arm(
         trial: Real telemetry for the evaluation.
         detectors: Maps a name to a factory, which takes a seed and returns an unfitted detector.
         seed: Seed for the detectors.
-        num_blocks: Number of consecutive blocks of time for which false alarms are counted separately.
 
     Returns:
         The rows of two tables: `alarms` (detector, block, alarms, windows) and `recall` (detector, kind, severity, recall,
@@ -99,7 +96,7 @@ def evaluate_arm(
         detector = make(seed).fit(training)
         limit = threshold(detector.score(held_out), trial.rate)
         nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
-        for block, scores in enumerate(np.array_split(nominal, num_blocks)):
+        for block, scores in enumerate(np.array_split(nominal, _NUM_BLOCKS)):
             tables["alarms"].append({"detector": name, "block": block, "alarms": int(np.sum(scores > limit)), "windows": len(scores)})
         all_scores = detector.score(np.concatenate(list(trial.anomalous.values())))
         parts = np.split(all_scores, np.cumsum([len(windows) for windows in trial.anomalous.values()])[:-1])

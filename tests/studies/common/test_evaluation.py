@@ -52,11 +52,11 @@ def test_every_kind_and_severity_is_there_at_the_same_places():
 def test_rates_worked_by_hand():
     made = trial(rate=0.1)
     held_out = noise(99, 5)
-    found = evaluate_arm(noise(50, 4), held_out, made, {"largest": lambda seed: Largest()}, seed=0, num_blocks=4)
+    found = evaluate_arm(noise(50, 4), held_out, made, {"largest": lambda seed: Largest()}, seed=0)
     threshold = np.sort(held_out.max(axis=1))[89]  # rank ceil(100 * 0.9) of 99
     alarms = made.nominal.max(axis=1) > threshold
-    assert [row["alarms"] for row in found["alarms"]] == [int(block.sum()) for block in np.split(alarms, 4)]
-    assert [row["windows"] for row in found["alarms"]] == [30] * 4
+    assert [row["alarms"] for row in found["alarms"]] == [int(block.sum()) for block in np.split(alarms, 10)]
+    assert [row["windows"] for row in found["alarms"]] == [12] * 10
     (row,) = [row for row in found["recall"] if (row["kind"], row["severity"]) == ("level_shift", 4.0)]
     scores = made.anomalous["level_shift", 4.0].max(axis=1)
     assert row["recall"] == np.mean(scores > threshold)

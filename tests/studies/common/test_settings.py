@@ -15,11 +15,6 @@ def test_noise_of_every_process_has_the_standard_deviation_of_the_settings(noise
     assert np.std(drawn) == pytest.approx(3.0, rel=0.03)
 
 
-def test_an_unknown_process_is_refused(refused):
-    with refused("'pink'"):
-        draw_noise("pink", np.zeros(3), 1.0, np.random.default_rng(0))
-
-
 def test_a_budget_and_changes_reach_their_groups(refused):
     made = make_settings("smoke", paper__seed=4, robustness__num_seeds=7)
     assert (made.seed, made.paper.epochs, made.robustness.num_seeds, made.robustness.num_windows) == (4, 2, 7, 200)
