@@ -53,12 +53,6 @@ def test_few_and_many_windows_are_those_of_the_two_pipelines(without_networks):
     assert np.array_equal(one.pairs(one.training_starts("few"))[1], paper["target"])
 
 
-def test_ridge_recovers_the_true_signal_from_the_coarse_one(without_networks):
-    windows = without_networks.example.windows("test", None)
-    error = [np.std(without_networks.enhancer("ridge", level)(windows["coarse"]) - windows["truth"]) for level in ("few", "many")]
-    assert error[1] < error[0] < np.std(windows["coarse"] - windows["truth"])
-
-
 def test_training_and_threshold_windows_differ_and_are_repeatable(without_networks):
     cell = Cell("few", "moving average", "ridge", "autoregression")
     first, other = (without_networks.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))

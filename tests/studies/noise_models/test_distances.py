@@ -6,7 +6,6 @@ import scipy.linalg
 import scipy.stats
 
 from enhsim_tf.common import measures
-from enhsim_tf.common.two_sample import linear_classifier
 from studies.noise_models import distances
 from tests.common.test_measures import autoregressive, normal
 
@@ -76,10 +75,10 @@ def test_a_generator_that_stands_still_is_infinitely_far_and_finite():
         (distances.window_spectra, distances.log_spectral_distance),
         (distances.log_scales, distances.log_scale_distance),
         (lambda windows: measures.lagged_products(windows, 20), distances.autocorrelation_distance),
-        (lambda windows: windows, distances.kurtosis_difference),
-        (lambda windows: windows, distances.tail_ratio),
+        *((lambda windows: windows, each) for each in (distances.kurtosis_difference, distances.tail_ratio)),
+        *((lambda windows: windows[:, :3], each) for each in (distances.density, distances.coverage, distances.mmd_squared)),
     ):
-        assert np.isfinite(compare(describe(still), describe(real)))
+        assert np.isfinite(compare(describe(still), describe(real))) and np.isfinite(compare(describe(real), describe(still)))
 
 
 def test_convolution_features_written_out(monkeypatch):
@@ -97,15 +96,6 @@ def test_convolution_features_written_out(monkeypatch):
                 responses = [np.correlate(window, spread, mode="valid") for window in windows]
                 expected.append([pool(response) if pool is np.max else pool(response, threshold) for response in responses])
     assert features == pytest.approx(np.transpose(expected), abs=1e-5)
-
-
-def test_convolutions_tell_what_they_should_and_not_what_they_should_not():
-    features = distances.convolution_features
-    same = linear_classifier(features(normal(150, 200)), features(normal(150, 200, seed=1)))
-    assert same.auc == pytest.approx(0.5, abs=5 * np.sqrt(301 / (12 * 150**2))) and same.p_value() > 0.01
-    for other in (autoregressive(150, 200, 0.4), 1.5 * normal(150, 200), normal(150, 200) + 0.5):
-        told = linear_classifier(features(other), features(normal(150, 200, seed=1)))
-        assert told.auc > 0.95 and told.p_value(99) == 0.01
 
 
 def test_density_and_coverage_by_hand_and_in_theory(monkeypatch):
@@ -137,9 +127,3 @@ def test_mmd_written_out():
 def test_mmd_is_unbiased():
     values = [distances.mmd_squared(normal(30, 2, seed=2 * seed), normal(30, 2, seed=2 * seed + 1)) for seed in range(300)]
     assert np.mean(values) == pytest.approx(0, abs=4 * np.std(values) / np.sqrt(300)) and min(values) < 0
-
-
-def test_features_that_stand_still_are_no_obstacle():
-    real, generated = normal(30, 3) * [1, 0, 1], normal(30, 3, seed=1)
-    found = [compare(generated, real) for compare in (distances.density, distances.coverage, distances.mmd_squared)]
-    assert np.isfinite(found).all()
