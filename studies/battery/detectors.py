@@ -101,16 +101,10 @@ class Judge:
 
 
 def alarm_rows(training: str, detector: str, held_out: np.ndarray, scores: Mapping[Fault | None, np.ndarray]) -> Rows:
-    """Judges a detector at the conformal threshold of `RATE` on held-out nominal windows.
-
-    Args:
-        training: What it learnt from.
-        detector: Its name.
-        held_out: Scores of nominal windows of its training data.
-        scores: Scores of the fine simulator's nominal windows (None) and of its windows under each fault.
+    """Judges a detector at the conformal threshold of `RATE` on scores of held-out nominal windows of its training data.
 
     Returns:
-        A row for nominal and for each fault: `alarms` is the share of windows with an alarm.
+        A row for nominal (None) and for each fault: `alarms` is the share of the fine simulator's windows with an alarm.
     """
     limit = metrics.threshold(held_out, RATE)
     return [

@@ -5,10 +5,13 @@ import dataclasses
 import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.console import Parser, run_command, tell
 from enhsim_tf.common.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PUBLISHED = Path(__file__).resolve().parents[1]
 
@@ -70,13 +73,13 @@ class Command:
         return 0
 
 
-def example_command(study: str, what: str, write: Callable[[Path], None], arguments: list[str] | None = None) -> int:
+def example_command(study: str, what: str, tables: "Callable[[], Mapping[str, pd.DataFrame]]", arguments: list[str] | None = None) -> int:
     """The command `python -m studies.STUDY.example`, which writes the recorded pair that ships with the project.
 
     Args:
         study: Name of the study.
         what: Of what the pair is, which is also the name of its folder in `examples`.
-        write: Writes the files to a folder.
+        tables: Simulates the tables of the pair by name.
         arguments: The command line; None: that of the process.
 
     Returns:
@@ -84,10 +87,14 @@ def example_command(study: str, what: str, write: Callable[[Path], None], argume
     """
 
     def run() -> int:
+        from enhsim_tf.common.atomic_files import make_folder, replace_file
+
         parser = Parser(prog=f"python -m studies.{study}.example", description=f"Writes the recorded pair of the {what}.")
         parser.add_argument("folder", type=Path, help=f"the output folder, such as examples/{what}")
-        folder = parser.parse_args(arguments).folder
-        write(folder)
+        folder = make_folder(parser.parse_args(arguments).folder)
+        for name, table in tables().items():
+            with replace_file(folder / f"{name}.csv") as temporary:
+                table.to_csv(temporary, index=False, lineterminator="\n")
         tell(f"telemetry and simulator with and without a fault in {folder}/")
         return 0
 

@@ -10,6 +10,7 @@ import pytest
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
+from studies.common.command import example_command
 from studies.reference_or_source import aircraft_flight, aircraft_point_mass, example
 from studies.reference_or_source.aircraft import NOISE_SD, RESOLUTION, Aircraft
 from studies.reference_or_source.aircraft_faults import ALL, ONSET, SIZES, UNIT_SAMPLES, Fault, sizes_over_flight
@@ -188,7 +189,7 @@ def test_the_recorded_pair_is_small_and_its_fault_parts_the_engines():
 
 
 def test_the_example_is_written_again_as_it_is(jsbsim, tmp_path):
-    example.write_example(tmp_path, num_flights=1)
+    assert example_command("reference_or_source", "aircraft", functools.partial(example.tables, num_flights=1), [str(tmp_path)]) == 0
     for name in ("simulator", "telemetry_fault", "simulator_planned"):
         table, shipped = pd.read_csv(tmp_path / f"{name}.csv"), pd.read_csv(FOLDER / f"{name}.csv")[:UNIT_SAMPLES]
         assert list(table) == list(shipped)
