@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from studies.battery.faults import measure
 from studies.reference_or_source.aircraft_faults import ALL, ONSET, UNIT_SAMPLES, Fault, sizes_over_flight
 from studies.reference_or_source.aircraft_flight import Vehicle, draw_wind, fly, import_jsbsim
 from studies.reference_or_source.aircraft_point_mass import Constants, simulate
@@ -124,9 +125,7 @@ class Aircraft:
 
     def measure(self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
         """Measures channels of shape `(samples, 6)` with sensors that add white noise, times `scale`, and round; returns float32."""
-        steps = np.array(RESOLUTION)
-        noisy = values + scale * np.array(NOISE_SD) * rng.standard_normal(np.shape(values))
-        return (np.rint(noisy / steps) * steps).astype(np.float32)
+        return measure(values, scale * np.array(NOISE_SD), np.array(RESOLUTION), rng)
 
 
 def _draw_target(limits: tuple[int, int], step: int, grid: int, rng: np.random.Generator) -> np.ndarray:

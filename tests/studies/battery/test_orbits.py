@@ -37,7 +37,8 @@ def test_faults_begin_at_their_onset():
 
 
 def test_the_sensor_adds_noise_and_rounds():
-    steps = measure(np.full(20_000, 3.7), 0.002, 5 / 4096, np.random.default_rng(0)).astype(np.float64) / (5 / 4096)
-    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-3)
+    noise, step = np.array([0.002, 0.0]), np.array([5 / 4096, 0.5])
+    measured = measure(np.full((20_000, 2), 3.7), noise, step, np.random.default_rng(0)).astype(np.float64)
+    np.testing.assert_allclose(measured / step, np.rint(measured / step), atol=1e-3)
     expected = np.hypot(0.002, 5 / 4096 / np.sqrt(12))  # the variances of the noise and of the rounding add
-    assert np.std(steps) * 5 / 4096 == pytest.approx(expected, rel=0.02)
+    assert np.std(measured, axis=0) == pytest.approx([expected, 0], rel=0.02) and (measured[:, 1] == 3.5).all()

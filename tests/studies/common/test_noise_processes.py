@@ -76,12 +76,6 @@ def test_shot_noise_has_its_cumulants_and_its_tail():
     assert np.mean(noise > 1.5) == pytest.approx(0.02 * np.exp(-1.5 / 0.5), rel=0.15)
 
 
-def test_bernoulli_noise_has_its_moments():
-    noise = noises.bernoulli(2_000_000, rng(), probability=0.02, impulse_sd=1.0, background_sd=0.1)
-    assert np.var(noise) == pytest.approx(0.03, rel=0.02)
-    assert np.mean(noise**4) == pytest.approx(3 * (0.02 * 1.01**2 + 0.98 * 0.01**2), rel=0.06)
-
-
 def test_heteroscedastic_scale_is_a_slow_gaussian_process():
     noise = noises.heteroscedastic(2_000_000, rng(), log_scale_sd=0.5, sd=2.0, correlation=20)
     assert np.mean(noise**4) / np.mean(noise**2) ** 2 == pytest.approx(3 * np.exp(4 * 0.5**2), rel=0.15)

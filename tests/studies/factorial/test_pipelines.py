@@ -14,13 +14,8 @@ from studies.factorial.pipelines import THRESHOLD, TRAINING, Pipelines
 from studies.factorial.summary import KEPT
 from studies.robustness.replicate import Replicate
 
-SMALL = {
-    "paper__num_windows": 40,
-    "second__num_windows": 90,
-    "robustness__num_windows": 30,
-    "paper__iterations": 1,
-    "paper__record_every": 1,
-}
+SMALL = {"paper__num_windows": 40, "second__num_windows": 90, "robustness__num_windows": 30}
+SMALL |= {"paper__iterations": 1, "paper__record_every": 1}
 
 
 @pytest.fixture(scope="module")
@@ -46,19 +41,13 @@ def test_the_residual_is_telemetry_minus_the_signal_and_keeps_its_scale(without_
     assert np.std(averaged) == pytest.approx(0.1 * np.sqrt(1 - 1 / 25), rel=0.05)  # what a moving average of 25 samples leaves
 
 
-def test_few_and_many_windows_are_those_of_the_two_pipelines(without_networks):
-    one = without_networks
+def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable(without_networks):
+    one, cell = without_networks, Cell("few", "moving average", "ridge", "autoregression")
     assert [len(one.training_starts(windows)) for windows in ("few", "many")] == [40, 90]
-    paper = one.example.windows("train", 40, "training windows")
-    assert np.array_equal(one.pairs(one.training_starts("few"))[1], paper["target"])
-
-
-def test_training_and_threshold_windows_differ_and_are_repeatable(without_networks):
-    cell = Cell("few", "moving average", "ridge", "autoregression")
-    first, other = (without_networks.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
+    assert np.array_equal(one.pairs(one.training_starts("few"))[1], one.example.windows("train", 40, "training windows")["target"])
+    first, other = (one.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
     assert first.shape == other.shape == (30, 500) and not np.allclose(first, other)
-    again = Pipelines(without_networks.replicate)
-    assert np.array_equal(again.arm(cell, TRAINING), first)
+    assert np.array_equal(Pipelines(one.replicate).arm(cell, TRAINING), first)
 
 
 @pytest.mark.slow

@@ -10,11 +10,6 @@ from studies.noise_models import distances
 from tests.common.test_measures import autoregressive, normal
 
 
-def test_lagged_products_of_squares_by_hand():
-    windows, squares = np.array([[1.0, 2, 4], [-1, -2, -4]]), np.array([1.0, 4, 16]) - 7  # their mean is 0
-    assert distances.lagged_square_products(windows + 9, 1)[0] == pytest.approx([np.mean(squares**2), (6 * 3 - 3 * 9) / 2])
-
-
 def test_autocorrelation_distance_is_the_largest_difference():
     one, other = np.array([[2.0, 1, 0], [2, 0, 0]]), np.array([[1.0, 0.5, 0.5]])  # correlations 1, 1/4, 0 and 1, 1/2, 1/2
     assert distances.autocorrelation_distance(one, other) == pytest.approx(0.5)

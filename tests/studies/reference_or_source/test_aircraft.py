@@ -12,7 +12,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
 from studies.common.command import example_command
 from studies.reference_or_source import aircraft_flight, aircraft_point_mass, example
-from studies.reference_or_source.aircraft import NOISE_SD, RESOLUTION, Aircraft
+from studies.reference_or_source.aircraft import Aircraft
 from studies.reference_or_source.aircraft_faults import ALL, ONSET, SIZES, UNIT_SAMPLES, Fault, sizes_over_flight
 
 AIRCRAFT = Aircraft()
@@ -64,14 +64,6 @@ def test_steps_of_the_targets_are_reached(request, simulator, level):
     assert np.abs(run[:101, ALTITUDE] - 12_000).max() < 5 and abs(run[400, ALTITUDE] - 13_000) < 20
     assert abs(run[599, AIRSPEED] - 260) < 1 and abs(run[-1, AIRSPEED] - 275) < 1
     np.testing.assert_allclose(run[100:400, CLIMB].sum() / 60, 1_000, rtol=0.02)  # climb rate is the altitude's derivative
-
-
-def test_turbulence_has_its_standard_deviation_and_correlation():
-    wind = np.concatenate([aircraft_flight.draw_wind(np.random.default_rng(seed)) for seed in range(20)])
-    np.testing.assert_allclose(wind.std(0), [1.0, 0.8], rtol=0.05)
-    for column, time_s in zip(wind.T, (8.0, 4.0), strict=True):
-        shift = int(time_s * aircraft_flight.CONTROLS_A_SECOND)
-        assert np.corrcoef(column[:-shift], column[shift:])[0, 1] == pytest.approx(np.exp(-1), abs=0.05)
 
 
 def test_a_pitot_tube_that_reads_high_slows_the_aircraft_by_as_much(jsbsim, calm, level):
@@ -146,16 +138,6 @@ def test_commands_stay_within_their_limits_and_step_every_90_seconds():
         steps = np.abs(np.diff(values, axis=1))
         assert low <= values.min() and values.max() <= high and steps.max() <= largest
         assert UNIT_SAMPLES / np.count_nonzero(steps, axis=1).mean() == pytest.approx(90, rel=0.15)
-
-
-def test_sensors_have_their_noise_and_resolution():
-    values = np.random.default_rng(0).uniform(100, 200, (50_000, 6))
-    telemetry = AIRCRAFT.measure(values, np.random.default_rng(1), scale=2.0).astype(float)
-    rounding = np.array(RESOLUTION) / np.sqrt(12)
-    np.testing.assert_allclose((telemetry - values).std(0), np.hypot(2 * np.array(NOISE_SD), rounding), rtol=0.02)
-    np.testing.assert_allclose(telemetry / RESOLUTION, np.rint(telemetry / RESOLUTION), atol=1e-3)
-    without = AIRCRAFT.measure(values, np.random.default_rng(1), scale=0.0)
-    assert np.all(np.abs(without - values) <= np.array(RESOLUTION) / 2 + 1e-4)
 
 
 def test_a_fault_has_its_size_at_the_end_and_no_other_grows_with_it():

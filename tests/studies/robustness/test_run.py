@@ -17,15 +17,8 @@ from studies.robustness.summary import KEPT
 
 pytestmark = pytest.mark.slow
 
-SMALL = {
-    "paper__num_windows": 40,
-    "modes__num_learnt": 90,
-    "robustness__num_windows": 120,
-    "robustness__num_seeds": 1,
-    "paper__iterations": 1,
-    "paper__record_every": 1,
-    "paper__hidden_units": 64,
-}
+SMALL = {"paper__num_windows": 40, "modes__num_learnt": 90, "robustness__num_windows": 120}
+SMALL |= {"robustness__num_seeds": 1, "paper__iterations": 1, "paper__record_every": 1, "paper__hidden_units": 64}
 
 
 @pytest.mark.usefixtures("narrow_networks")
