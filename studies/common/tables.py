@@ -24,6 +24,7 @@ class KeptTables:
         digits: Decimals that numbers are rounded to.
         command: The command that produces them.
         digits_of: Decimals of tables that differ from `digits`.
+        kind: Word for messages.
     """
 
     names: tuple[str, ...]
@@ -31,6 +32,7 @@ class KeptTables:
     digits: int
     command: str
     digits_of: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    kind: str = "study"
 
     def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
         """Writes tables by name to a folder: labels as dictionaries, and numbers rounded to the precision that their counts support."""
@@ -54,7 +56,7 @@ class KeptTables:
 
         missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
         if missing:
-            raise InputError(f"Expected the tables of the study in {folder}. Received: no {missing[0]}.parquet. Run {self.command}.")
+            raise InputError(f"Expected the tables of the {self.kind} in {folder}. Received: no {missing[0]}.parquet. Run {self.command}.")
         tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in self.names}
         for table in tables.values():
             for column in set(self.labels) & set(table.columns):

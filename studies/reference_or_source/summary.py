@@ -16,6 +16,7 @@ KEPT = KeptTables(
     ("alarms",),
     labels=("axis", "level", "simulator", "use", "detector", "kind", "system"),
     digits=4,
+    kind="study",
     command="python -m studies.reference_or_source",
 )
 DETECTOR = {use: "boosted trees" if use in (SOURCE_FAULTS, REFERENCE_FAULTS) else "joint size" for use in USES}

@@ -27,7 +27,7 @@ def test_the_published_findings_are_those_of_the_published_tables(study, near):
     assert again == near(shared(kept, again)) and kept["budget"] == "full"
 
 
-@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize("study", [*STUDIES, "reference_or_source"])
 def test_the_figures_are_drawn_from_the_findings(study, tmp_path):
     figures = importlib.import_module(f"studies.{study}.figure").FIGURES
     paths = save_all(figures, findings(study), tmp_path, f"python -m studies.{study}")
@@ -58,11 +58,27 @@ def of_spacecraft(found):
         yield name, [about["auc_pr"]["mean"], 100 * about["false_alarms"]["mean"], 100 * about["found"]["0.01"]]
 
 
+def of_reference_or_source(found):
+    shown = {"reference, enhanced run": "reference", "source, detectors of nominal windows": "source", "no simulator": "no simulator"}
+    for name, use in shown.items():
+        values = []
+        for about in found["systems"].values():
+            middle = next(each["units"] for each in about["points"] if each["axis"] != "main")
+            of_main = {
+                each["units"]: each["uses"].get(use)
+                for each in about["points"]
+                if (each["axis"], each["simulator"]) == ("main", "wrong physics")
+            }
+            values += [100 * value for value in (*of_main[middle]["recall"].values(), of_main[middle]["false_alarms"]["mean"])]
+        yield name, values
+
+
 @pytest.mark.parametrize(
     ("study", "values", "number", "within"),
     [
         ("battery", of_battery, 8, [0.051] * 8),
         ("factorial", of_factorial, 14, [0.051] * 4 + [0.51]),
+        ("reference_or_source", of_reference_or_source, 3, [0.051, 0.51, 0.51, 0.051] * 2),
         ("robustness", of_robustness, 6, [0.051] * 6),
         ("spacecraft", of_spacecraft, 11, [0.0051, 0.051, 0.51]),
     ],

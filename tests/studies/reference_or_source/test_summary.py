@@ -37,16 +37,3 @@ def test_the_published_findings_come_from_the_published_table(near):
         points = {(each["axis"], each["simulator"], each["units"]): each for each in published["systems"][system]["points"]}
         for point in about["points"]:
             assert points[point["axis"], point["simulator"], point["units"]] == near(point)
-
-
-def test_the_table_of_the_readme_has_the_published_numbers(numbers_of):
-    published, shown = json.loads((RESULTS / "findings.json").read_text(encoding="utf-8")), numbers_of("reference_or_source")
-    names = {"reference, enhanced run": "reference", "source, detectors of nominal windows": "source", "no simulator": "no simulator"}
-    for system, first in (("battery", 0), ("aircraft", 4)):
-        points = published["systems"][system]["points"]
-        middle = next(each["units"] for each in points if each["axis"] != "main")
-        point = next(each for each in points if (each["axis"], each["simulator"], each["units"]) == ("main", "wrong physics", middle))
-        for name, use in names.items():
-            recall = point["uses"][use]["recall"]
-            expected = [round(100 * recall["mean"], 1), round(100 * recall["low"]), round(100 * recall["high"])]
-            assert shown[name][first : first + 3] == expected
