@@ -199,9 +199,9 @@ if is_full:
 # numbers of this standard deviation, the other draws whole windows of the real noise again.
 
 # %%
-from studies.common.noise_processes import NOISES
+from studies.common.noise_processes import GALLERY
 
-sd, shot, signal = pipeline.settings.noise_sd, NOISES["shot"], pool["truth"]
+sd, shot, signal = pipeline.settings.noise_sd, GALLERY["shot"], pool["truth"]
 
 
 def draw_shot(num_windows):

@@ -20,7 +20,7 @@ from lesson_tools import check_answer, drawing, open_pipeline, open_study
 
 from enhsim_tf.common import measures, two_sample
 from enhsim_tf.common.plot_style import AVERAGE, GENERATED, QUIET, REAL
-from studies.common.noise_gallery import GALLERY
+from studies.common.noise_processes import GALLERY
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 
 is_full = open_pipeline()[1] == "full"  # nothing else of the paper's example is used here

@@ -1,6 +1,6 @@
 """Measures of the difference between generated and real windows, as pure functions (evaluates sections 2.2 and 2.3 of the paper).
 
-Windows have the shape `(windows, samples)`. `studies.robustness.distances` has further ones.
+Windows have the shape `(windows, samples)`. `studies.noise_models.distances` has further ones.
 """
 
 import numpy as np

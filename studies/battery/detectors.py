@@ -11,7 +11,7 @@ from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhancer.candidates import block_edges, fit_enhancer, split_fold
 from studies.battery.faults import ALL, Fault, columns_of
 from studies.battery.orbits import ORBIT_SAMPLES
-from studies.battery.record import WINDOW, PairWindows, Recorded, coarse_windows, judged_windows, pair_windows
+from studies.battery.record import WINDOW, PairWindows, Runs, coarse_windows, judged_windows, pair_windows, run_key
 
 COARSE, WITH_RESIDUALS, REAL_15, REAL_120 = "coarse", "enhanced + residual windows", "real, 15 orbits", "real, 120 orbits"
 SOURCES = (COARSE, WITH_RESIDUALS, REAL_15, REAL_120)
@@ -34,16 +34,16 @@ class Judge:
     """Trains detectors for a replicate and judges them.
 
     Args:
-        recorded: The runs.
+        runs: The runs, see `record.Runs`.
         pairs: The windows that the simulator is fitted to.
         candidate: The enhancer, one of `enhancer.names.CANDIDATES`.
         seed: Seed of everything drawn.
     """
 
-    def __init__(self, recorded: Recorded, pairs: PairWindows, candidate: str, seed: int):
-        self.recorded, self.pairs, self.candidate, self.seed = recorded, pairs, candidate, seed
+    def __init__(self, runs: Runs, pairs: PairWindows, candidate: str, seed: int):
+        self.runs, self.pairs, self.candidate, self.seed = runs, pairs, candidate, seed
         self.enhance = self._fit(slice(None))
-        self.test = {fault: judged_windows(recorded, fault, seed).telemetry for fault in (None, *ALL)}
+        self.test = {fault: judged_windows(runs, fault, seed).telemetry for fault in (None, *ALL)}
         """Telemetry on which detectors are judged: nominal (None) and under each fault."""
 
     def _fit(self, rows: Any) -> Callable[[np.ndarray], np.ndarray]:
@@ -66,13 +66,13 @@ class Judge:
 
     def sources(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Training windows and threshold windows of each of `SOURCES`."""
-        run = self.recorded.get("coarse", "coarse")
+        run = self.runs[run_key("coarse", "coarse")]
         coarse, num_orbits = coarse_windows(run, 2 * NUM), len(run) // ORBIT_SAMPLES - 1
         # whole residual windows, drawn again
         noise = self.residuals[np.random.default_rng([self.seed, 1]).integers(0, len(self.residuals), len(coarse))]
-        dense = pair_windows(self.recorded, "fit", 2 * NUM, self.seed)
+        dense = pair_windows(self.runs, "fit", 2 * NUM, self.seed)
         is_early = dense.starts + WINDOW <= (_PART_ORBITS + 1) * ORBIT_SAMPLES
-        fit, more = (pair_windows(self.recorded, part, NUM, self.seed).telemetry for part in ("fit", "more"))
+        fit, more = (pair_windows(self.runs, part, NUM, self.seed).telemetry for part in ("fit", "more"))
         return {
             COARSE: _apart(coarse[:, :, 0], 1 / 2, num_orbits),
             WITH_RESIDUALS: _apart(self.enhance(coarse) + noise, 1 / 2, num_orbits),
@@ -93,7 +93,7 @@ class Judge:
         """Judges the root-mean-square residual of each window. Its threshold comes from the orbits that the simulator is fitted to."""
         scores: dict[str, dict[Fault | None, np.ndarray]] = {ENHANCED_RUN: {}, COARSE_RUN: {}}
         for fault, telemetry in self.test.items():
-            planned = judged_windows(self.recorded, fault, self.seed, is_planned=True).coarse
+            planned = judged_windows(self.runs, fault, self.seed, is_planned=True).coarse
             scores[ENHANCED_RUN][fault] = _rms(telemetry - self.enhance(planned))
             scores[COARSE_RUN][fault] = _rms(telemetry - planned[:, :, 0])
         fitted = {ENHANCED_RUN: self.residuals, COARSE_RUN: self.pairs.telemetry - self.pairs.coarse[:, :, 0]}
@@ -101,16 +101,10 @@ class Judge:
 
 
 def alarm_rows(training: str, detector: str, held_out: np.ndarray, scores: Mapping[Fault | None, np.ndarray]) -> Rows:
-    """Judges a detector at the conformal threshold of `RATE` on held-out nominal windows.
-
-    Args:
-        training: What it learnt from.
-        detector: Its name.
-        held_out: Scores of nominal windows of its training data.
-        scores: Scores of the fine simulator's nominal windows (None) and of its windows under each fault.
+    """Judges a detector at the conformal threshold of `RATE` on scores of held-out nominal windows of its training data.
 
     Returns:
-        A row for nominal and for each fault: `alarms` is the share of windows with an alarm.
+        A row for nominal (None) and for each fault: `alarms` is the share of the fine simulator's windows with an alarm.
     """
     limit = metrics.threshold(held_out, RATE)
     return [

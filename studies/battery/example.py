@@ -9,13 +9,11 @@ The files need no PyBaMM to be read. Times count seconds.
     simulator_planned.csv  the coarse simulator over those orbits without the fault: what should have happened
 """
 
-import functools
 import sys
-from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from enhsim_tf.common.atomic_files import make_folder, replace_file
 from studies.battery.faults import SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, draw_load
 from studies.battery.simulate import COLUMNS, simulate_all
@@ -27,47 +25,43 @@ FAULT = Fault("raised resistance", 1.0)
 _DIGITS = tuple(zip(COLUMNS, (4, 3, 2), strict=True))
 
 
-def write_example(folder: Path, seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int = NUM_FAULT_ORBITS) -> None:
-    """Simulates the pair in the gentle regime and writes its five files.
+def tables(seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int = NUM_FAULT_ORBITS) -> dict[str, pd.DataFrame]:
+    """Simulates the pair in the gentle regime.
 
     Args:
-        folder: The output folder, which is created.
         seed: Seed of the loads and of the sensor.
         num_orbits: Nominal orbits.
         num_fault_orbits: Orbits of the run with a fault; the first is nominal.
 
+    Returns:
+        The five tables by name.
+
     Raises:
-        InputError: If PyBaMM is not installed or the folder cannot be written to.
+        InputError: If PyBaMM is not installed.
     """
-    import pandas as pd
 
     def in_columns(times: np.ndarray, values: np.ndarray) -> pd.DataFrame:
         columns = {name: [f"{value:.{digits}f}" for value in column] for (name, digits), column in zip(_DIGITS, values.T, strict=True)}
         return pd.DataFrame({"time": times} | columns)
 
-    folder, regime = make_folder(folder), REGIMES["gentle"]
+    regime, found = REGIMES["gentle"], {}
     loads, noise = np.random.default_rng([seed, 0]), np.random.default_rng([seed, 1])
     for number, fault, suffix in ((num_orbits, None, ""), (num_fault_orbits, FAULT, "_fault")):
         load = draw_load(number + 1, regime, loads)  # in the first orbit, which is left out, the battery reaches its usual temperature
         *planned, runs = simulate_all(load, regime, [fault] if fault is None else [None, fault], onset=2 * ORBIT_SAMPLES)
-        coarse, fine = (run.values[ORBIT_SAMPLES:] for run in runs)
+        coarse, fine = (run[ORBIT_SAMPLES:] for run in runs)
         times = np.arange(len(coarse)) * int(INTERVAL_S)
         simulator = in_columns(times, coarse)
-        tables = {}
         if fault is not None:
-            tables["simulator_planned"] = in_columns(times, planned[0][0].values[ORBIT_SAMPLES:])
+            found["simulator_planned"] = in_columns(times, planned[0][0][ORBIT_SAMPLES:])
             is_faulty = times >= ORBIT_SAMPLES * INTERVAL_S
             simulator["scenario"] = np.where(is_faulty, fault.kind, "nominal")
             simulator["severity"], simulator["mask"] = np.where(is_faulty, fault.severity, 0.0), is_faulty.astype(int)
         volts = measure(fine[:, 0], SENSOR_NOISE_V, SENSOR_STEP_V, noise)
         telemetry = pd.DataFrame({"time": times, "volts": [f"{value:.4f}" for value in volts]})
-        tables |= {f"telemetry{suffix}": telemetry, f"simulator{suffix}": simulator}
-        for name, table in tables.items():
-            with replace_file(folder / f"{name}.csv") as temporary:
-                table.to_csv(temporary, index=False, lineterminator="\n")
+        found |= {f"telemetry{suffix}": telemetry, f"simulator{suffix}": simulator}
+    return found
 
-
-main = functools.partial(example_command, "battery", "battery", write_example)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(example_command("battery", "battery", tables))

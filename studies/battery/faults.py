@@ -58,7 +58,7 @@ def columns_of(fault: Fault | None) -> dict[str, str | float]:
     return {"fault": "nominal" if fault is None else fault.kind, "severity": 0.0 if fault is None else fault.severity}
 
 
-def measure(values: np.ndarray, noise_sd: float, step: float, rng: np.random.Generator) -> np.ndarray:
+def measure(values: np.ndarray, noise_sd: float | np.ndarray, step: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Measures simulated values of any shape: the sensor adds white noise of `noise_sd` and rounds to multiples of `step`, in float32."""
     noisy = values + noise_sd * rng.standard_normal(np.shape(values))
     return (np.rint(noisy / step) * step).astype(np.float32)

@@ -1,15 +1,13 @@
 """The runs of both simulators that a replicate works with, and windows of them, through the sensor: what is learnt from and judged on."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from enhsim_tf.common.atomic_files import write_json
 from enhsim_tf.common.console import SILENT, Progress
-from enhsim_tf.common.stages import load_arrays, save_arrays
+from enhsim_tf.common.stages import save_arrays
 from enhsim_tf.simulator.joint import cut
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
 from studies.battery.faults import ALL, SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
@@ -32,20 +30,13 @@ NUM_TEST, NUM_FAULT = 400, 40
 _AFTER_ONSET = round(60 / INTERVAL_S)  # samples in which a fault grows to its full size
 
 
-class Recorded(NamedTuple):
-    """The runs of a replicate.
+Runs = Mapping[str, np.ndarray]
+"""The runs of a replicate, float32 of shape `(samples, 3)` with the columns `simulate.COLUMNS`, by the key that `run_key` gives."""
 
-    Args:
-        runs: float32 arrays of shape `(samples, 3)` with the columns `simulate.COLUMNS`, by `part/fault/model`.
-        reduced: How often the current was reduced because a solver failed, for each run in which it was.
-    """
 
-    runs: dict[str, np.ndarray]
-    reduced: Mapping[str, int]
-
-    def get(self, part: str, model: str, fault: Fault | None = None) -> np.ndarray:
-        """The run of a model, `coarse` or `fine`, in one of `PARTS`, shape `(samples, 3)`; the fault is None for nominal."""
-        return self.runs[f"{part}/{key_of(fault)}/{model}"]
+def run_key(part: str, model: str, fault: Fault | None = None) -> str:
+    """The key of the run of a model, `coarse` or `fine`, in one of `PARTS`; the fault is None for nominal."""
+    return f"{part}/{key_of(fault)}/{model}"
 
 
 def key_of(fault: Fault | None) -> str:
@@ -69,22 +60,13 @@ def record(folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, p
         InputError: If PyBaMM is not installed, or a solver fails at any current.
     """
     arrays: dict[str, np.ndarray] = {}
-    reduced: dict[str, int] = {}
     told = progress.loop("part", len(PARTS))
     for number, (part, (faults, models)) in enumerate(PARTS.items()):
         load = draw_load(counts[part] + 1, regime, np.random.default_rng([seed, number]))
         for fault, runs in zip(faults, simulate_all(load, regime, faults, [MODELS[name] for name in models]), strict=True):
-            arrays |= {f"{part}/{key_of(fault)}/{model}": run.values for model, run in zip(models, runs, strict=True)}
-            if runs[0].reductions:
-                reduced[f"{part}/{key_of(fault)}"] = runs[0].reductions
+            arrays |= {run_key(part, model, fault): run for model, run in zip(models, runs, strict=True)}
         told(number + 1)
     save_arrays(folder, arrays, "runs")
-    write_json(folder / "about.json", {"reduced": reduced})
-
-
-def read(folder: Path) -> Recorded:
-    """Reads what `record` wrote."""
-    return Recorded(load_arrays(folder, "runs"), json.loads((folder / "about.json").read_text(encoding="utf-8"))["reduced"])
 
 
 class PairWindows(NamedTuple):
@@ -92,37 +74,32 @@ class PairWindows(NamedTuple):
 
     Args:
         coarse: The coarse simulator's voltage, current and temperature, float32 of shape `(windows, WINDOW, 3)`.
-        fine: The fine simulator's voltage without noise, shape `(windows, WINDOW)`.
-        telemetry: The same through the sensor.
+        telemetry: The fine simulator's voltage through the sensor, shape `(windows, WINDOW)`.
         starts: First sample of each window in its run.
     """
 
     coarse: np.ndarray
-    fine: np.ndarray
     telemetry: np.ndarray
     starts: np.ndarray
 
 
-def pair_windows(
-    recorded: Recorded, part: str, number: int, seed: int, fault: Fault | None = None, is_planned: bool = False
-) -> PairWindows:
+def pair_windows(runs: Runs, part: str, number: int, seed: int, fault: Fault | None = None, is_planned: bool = False) -> PairWindows:
     """Cuts a number of windows of both simulators, spread evenly over the run of a part.
 
     The noise of the sensor depends on the seed, the part and the fault only, so that windows of a run share the noise of their
     common samples. With `is_planned`, the coarse windows are those of the nominal run, which an operator has without knowing of a fault.
     """
-    fine = recorded.get(part, "fine", fault)[:, 0]
-    coarse = recorded.get(part, "coarse", None if is_planned else fault)
+    fine = runs[run_key(part, "fine", fault)][:, 0]
+    coarse = runs[run_key(part, "coarse", None if is_planned else fault)]
     rng = np.random.default_rng([seed, 0, *f"{part}/{key_of(fault)}".encode()])
-    telemetry = measure(fine, SENSOR_NOISE_V, SENSOR_STEP_V, rng)
-    starts = _starts(fine, number)
-    return PairWindows(cut([coarse], starts, WINDOW), cut_windows(fine, starts, WINDOW), cut_windows(telemetry, starts, WINDOW), starts)
+    telemetry, starts = measure(fine, SENSOR_NOISE_V, SENSOR_STEP_V, rng), _starts(fine, number)
+    return PairWindows(cut([coarse], starts, WINDOW), cut_windows(telemetry, starts, WINDOW), starts)
 
 
-def judged_windows(recorded: Recorded, fault: Fault | None, seed: int, is_planned: bool = False) -> PairWindows:
-    """Windows of the test orbits, or of a fault, on which enhancers and detectors are judged; see `pair_windows`."""
+def judged_windows(runs: Runs, fault: Fault | None, seed: int, is_planned: bool = False) -> PairWindows:
+    """Windows of the test orbits, or of a fault, on which detectors are judged; see `pair_windows`."""
     part, number = ("test", NUM_TEST) if fault is None else ("fault", NUM_FAULT)
-    return pair_windows(recorded, part, number, seed, fault, is_planned)
+    return pair_windows(runs, part, number, seed, fault, is_planned)
 
 
 def coarse_windows(run: np.ndarray, number: int) -> np.ndarray:

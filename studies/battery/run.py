@@ -5,16 +5,17 @@ import importlib.metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.stages import Stages
+from enhsim_tf.common.stages import Stages, load_arrays
 from studies.battery import record
 from studies.battery.orbits import REGIMES
-from studies.battery.simulate import check_installed
-from studies.battery.summary import KEPT
+from studies.battery.simulate import import_pybamm
 from studies.common.replicates import run_study
 from studies.common.settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_NUM_WINDOWS = 1_500  # to which the enhanced simulator is fitted
 
 
 def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str, Any]:
@@ -23,7 +24,7 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
     Raises:
         InputError: If PyBaMM is not installed.
     """
-    check_installed()
+    import_pybamm()
     versions = {"pybamm": importlib.metadata.version("pybamm")}
 
     def tables_of(regime: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
@@ -33,40 +34,25 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
 
 
 def tables_of_cell(settings: Settings, stages: Stages, regime: str, seed: int, version: str) -> "dict[str, pd.DataFrame]":
-    """Simulates the runs of one seed in one regime with this version of PyBaMM, and judges enhancers and detectors on them."""
+    """Simulates the runs of one seed in one regime with this version of PyBaMM, and judges detectors on them."""
     import pandas as pd
 
-    chosen = settings.battery
-    counts = {part: getattr(chosen, f"{part}_orbits") for part in record.PARTS}
+    counts = {part: getattr(settings.battery, f"{part}_orbits") for part in record.PARTS}
 
     def simulate(folder: Path) -> None:
         record.record(folder, counts, REGIMES[regime], seed, stages.progress)
 
     simulated = f"battery {regime} {seed}"
-    runs = stages.run(simulated, simulate, (counts, regime, seed, version))
+    folder = stages.run(simulated, simulate, (counts, regime, seed, version))
 
-    def judge(folder: Path) -> None:
-        for name, rows in judge_cell(record.read(runs), regime, seed, settings).items():
-            pd.DataFrame(rows).assign(regime=regime, seed=seed).to_parquet(folder / f"{name}.parquet")
+    def judge(found: Path) -> None:
+        from enhsim_tf.enhancer.candidates import choose_enhancer
+        from studies.battery.detectors import Judge
 
-    judged = stages.run(f"battery judged {regime} {seed}", judge, (regime, seed, chosen.paper_epochs), [simulated])
-    return {name: pd.read_parquet(judged / f"{name}.parquet") for name in KEPT.names}
+        runs = load_arrays(folder, "runs")
+        pairs = record.pair_windows(runs, "fit", _NUM_WINDOWS, seed)
+        chosen = choose_enhancer(pairs.coarse, pairs.telemetry, pairs.starts, seed=seed).enhancer.name
+        one = Judge(runs, pairs, chosen, seed)
+        pd.DataFrame(one.source_rows() + one.reference_rows()).assign(regime=regime, seed=seed).to_parquet(found / "alarms.parquet")
 
-
-def judge_cell(recorded: record.Recorded, regime: str, seed: int, settings: Settings) -> dict[str, list[dict[str, Any]]]:
-    """The rows of all tables for recorded runs."""
-    from studies.battery import errors
-    from studies.battery.detectors import Judge
-
-    pairs = record.pair_windows(recorded, "fit", errors.NUM_WINDOWS, seed)
-    enhancers = errors.fit_enhancers(pairs, tuple(errors.ENHANCERS), seed, settings.battery.paper_epochs)
-    choice = errors.choice_rows(pairs, seed)
-    judge = Judge(recorded, pairs, next(row["candidate"] for row in choice if row["is_chosen"]), seed)
-    return {
-        "errors": errors.error_rows(recorded, enhancers, seed),
-        "choice": choice,
-        "trust": errors.trust_rows(recorded, pairs),
-        "speed": errors.speed_rows(recorded, enhancers, REGIMES[regime], seed),
-        "runs": [{"num_runs": len(recorded.runs), "num_reduced": len(recorded.reduced)}],
-        "alarms": judge.source_rows() + judge.reference_rows(),
-    }
+    return {"alarms": pd.read_parquet(stages.run(f"battery judged {regime} {seed}", judge, (regime, seed), [simulated]) / "alarms.parquet")}

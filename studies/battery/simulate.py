@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError
 from studies.battery.faults import Fault, drift_under, load_under, simulator_inputs
 from studies.battery.orbits import FIRST_CHARGE, INTERVAL_S, ORBIT_SAMPLES, Regime, battery_current
@@ -60,17 +61,13 @@ _KINK_A = 0.2  # where the slope of the current changes by more than this, the s
 _REDUCTION, _MOST_REDUCTIONS = 0.9, 8  # after a failure of a solver, the current is multiplied by this, at most so often
 
 
-@dataclasses.dataclass(frozen=True)
-class Run:
-    """A run of one simulator: float32 of shape `(samples, 3)` with `COLUMNS`, and how often the current was reduced for the solver."""
-
-    values: np.ndarray
-    reductions: int = 0
-
-
 @functools.cache
-def _pybamm() -> Any:
-    """Imports PyBaMM with its usage reports switched off, which it looks up when it is imported."""
+def import_pybamm() -> Any:
+    """Imports PyBaMM with its usage reports switched off, which it looks up when it is imported.
+
+    Raises:
+        InputError: If it is not installed.
+    """
     os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"
     try:
         import pybamm
@@ -83,12 +80,9 @@ def _pybamm() -> Any:
     return pybamm
 
 
-def check_installed() -> None:
-    """Raises an `InputError` if PyBaMM is not installed."""
-    _pybamm()
-
-
-def simulate(model: Model, current: np.ndarray, regime: Regime, faults: Sequence[Fault | None], onset: int = ONSET) -> list[Run | None]:
+def simulate(
+    model: Model, current: np.ndarray, regime: Regime, faults: Sequence[Fault | None], onset: int = ONSET
+) -> list[np.ndarray | None]:
     """Runs one simulator over a current, once for each fault.
 
     Args:
@@ -99,12 +93,12 @@ def simulate(model: Model, current: np.ndarray, regime: Regime, faults: Sequence
         onset: First sample of each fault.
 
     Returns:
-        A run for each fault, or None where the solver failed.
+        For each fault a float32 run of shape `(samples, 3)` with `COLUMNS`, or None where the solver failed.
 
     Raises:
         InputError: If PyBaMM is not installed.
     """
-    pybamm, clock = _pybamm(), np.arange(len(current)) * INTERVAL_S
+    pybamm, clock = import_pybamm(), np.arange(len(current)) * INTERVAL_S
     begun = onset * INTERVAL_S
     kinks = clock[np.flatnonzero(np.abs(np.diff(current, 2)) > _KINK_A) + 1]
     stops = np.unique(np.concatenate([[0.0], kinks, [time_s for time_s in (begun, begun + _ONSET_S) if time_s < clock[-1]], clock[-1:]]))
@@ -121,13 +115,13 @@ def simulate(model: Model, current: np.ndarray, regime: Regime, faults: Sequence
             continue
         volts = np.interp(clock, times, volts) + drift_under(len(clock), fault, onset)
         celsius = np.interp(clock, times, kelvins) - _ZERO_K
-        found.append(Run(np.stack([volts, current, celsius], axis=1).astype(np.float32)))
+        found.append(np.stack([volts, current, celsius], axis=1).astype(np.float32))
     return found
 
 
 def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float) -> Any:
     """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act from `begun` seconds."""
-    pybamm = _pybamm()
+    pybamm = import_pybamm()
     published = pybamm.ParameterValues("Chen2020")
     values, kelvins = published.copy(), regime.ambient_k if model.follows_ambient else _PUBLISHED_K
     charged = published.copy()
@@ -158,10 +152,10 @@ def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime,
 
 def simulate_all(
     load: np.ndarray, regime: Regime, faults: Sequence[Fault | None], models: Sequence[Model] = (COARSE, VEHICLE), onset: int = ONSET
-) -> list[tuple[Run, ...]]:
+) -> list[tuple[np.ndarray, ...]]:
     """Runs simulators over a load, once for each fault, driven by the same current; returns for each fault a run of each.
 
-    Where a solver fails, the current of that run is reduced by a tenth and all simulators run again; each `Run` counts how often.
+    Where a solver fails, the current of that run is reduced by a tenth and all simulators run again, which is told.
 
     Args:
         load: Load in amperes, shape `(samples,)`, from the start of an orbit.
@@ -174,7 +168,7 @@ def simulate_all(
         InputError: If PyBaMM is not installed, or a run fails at the smallest current too.
     """
     currents = [battery_current(load_under(load, fault, regime, onset), regime) for fault in faults]
-    found: dict[int, tuple[Run, ...]] = {}
+    found: dict[int, tuple[np.ndarray, ...]] = {}
     for number in range(_MOST_REDUCTIONS + 1):
         groups: dict[bytes, list[int]] = {}  # one built model is enough for equal currents
         for place, current in enumerate(currents):
@@ -184,8 +178,10 @@ def simulate_all(
             current, chosen = currents[same[0]] * _REDUCTION**number, [faults[place] for place in same]
             runs = zip(*(simulate(model, current, regime, chosen, onset) for model in models), strict=True)
             for place, each in zip(same, runs, strict=True):
-                if None not in each:
-                    found[place] = tuple(dataclasses.replace(run, reductions=number) for run in each)
+                if all(run is not None for run in each):
+                    found[place] = each
+                else:
+                    tell(f"a solver failed; the current is reduced to {_REDUCTION ** (number + 1):.2f} of the load's under {faults[place]}")
         if len(found) == len(faults):
             return [found[place] for place in range(len(faults))]
     failed = next(fault for place, fault in enumerate(faults) if place not in found)

@@ -3,27 +3,17 @@
 import argparse
 import dataclasses
 import importlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.console import Parser, run_command, tell
 from enhsim_tf.common.errors import InputError
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 PUBLISHED = Path(__file__).resolve().parents[1]
-
-
-@dataclasses.dataclass(frozen=True)
-class Option:
-    """A further option of a study.
-
-    Args:
-        name: Its name, such as `--environment`.
-        words: What `argparse` takes beside the name.
-    """
-
-    name: str
-    words: dict[str, Any]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,52 +21,41 @@ class Command:
     """The command of a study.
 
     Args:
-        study: Name of the study and of its folder.
+        study: Name of the study, of its folder and of its group of settings, whose `num_seeds` the option `--seeds` changes.
         description: What the study does, in a sentence.
-        group: The group of settings whose `num_seeds` the option `--seeds` changes.
+        options: Further options: for each name what `argparse` takes beside it.
         run: Runs the study; it takes the options, the settings and the output folder. None: `run` of `studies.STUDY.run`.
-        options: Further options.
     """
 
     study: str
     description: str
-    group: str
+    options: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     run: Callable[[argparse.Namespace, Any, Path], Any] | None = None
-    options: Sequence[Option] = ()
 
     def __call__(self, arguments: list[str] | None = None) -> int:
         """Runs the command. An error of the user is reported as one line, with exit code 2."""
         return run_command(
-            lambda: self._run(self.parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them"
+            lambda: self._run(self._parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them"
         )
 
-    def parse(self, arguments: list[str] | None = None) -> argparse.Namespace:
-        """Reads the command line without slow imports.
-
-        Raises:
-            InputError: If an option is unknown or its value cannot be used.
-        """
-        parser = Parser(prog=f"python -m studies.{self.study}", description=self.description)
+    def _parse(self, arguments: list[str] | None) -> argparse.Namespace:
+        """Reads the command line without slow imports."""
+        parser, own = Parser(prog=f"python -m studies.{self.study}", description=self.description), PUBLISHED / self.study / "results"
+        out_help = f"output folder (default: results/{self.study}; the published tables are in studies/{self.study}/results)"
         parser.add_argument(
             "--budget", choices=("smoke", "full"), default="full", help="size of the run (default: full, which takes hours)"
         )
         parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds (default: that of the published tables)")
-        parser.add_argument(
-            "--out",
-            type=Path,
-            metavar="DIR",
-            help=f"output folder (default: results/{self.study}; the published tables are in studies/{self.study}/results)",
-        )
+        parser.add_argument("--out", type=Path, metavar="DIR", default=Path("results") / self.study, help=out_help)
         parser.add_argument("--fresh", action="store_true", help="run every stage again instead of using the cache")
         parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached stages (default: .cache in a checkout)")
-        for option in self.options:
-            parser.add_argument(option.name, **option.words)
+        for name, words in self.options.items():
+            parser.add_argument(name, **words)
         options = parser.parse_args(arguments)
         if options.seeds is not None and options.seeds < 1:
             raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
-        out = options.out
-        if options.budget == "smoke" and out is not None and out.resolve() == PUBLISHED / self.study / "results":
-            raise InputError(f"Expected another folder for a smoke run than that of the published tables. Received: --out {out}.")
+        if options.budget == "smoke" and options.out.resolve() == own:
+            raise InputError(f"Expected another folder for a smoke run than that of the published tables. Received: --out {options.out}.")
         return options
 
     def _run(self, options: argparse.Namespace) -> int:
@@ -84,23 +63,23 @@ class Command:
         from enhsim_tf.common.stages import default_cache
         from studies.common.settings import make_settings
 
-        out = make_folder(options.out or Path("results") / self.study)
+        out = make_folder(options.out)
         remove_leftovers(out)
         options.cache = make_folder(options.cache or default_cache())
-        turned = {} if options.seeds is None else {f"{self.group}__num_seeds": options.seeds}
+        turned = {} if options.seeds is None else {f"{self.study}__num_seeds": options.seeds}
         run = self.run or importlib.import_module(f"studies.{self.study}.run").run
         run(options, make_settings(options.budget, **turned), out)
         tell(f"tables, findings.json and figures in {out}/")
         return 0
 
 
-def example_command(study: str, what: str, write: Callable[[Path], None], arguments: list[str] | None = None) -> int:
+def example_command(study: str, what: str, tables: "Callable[[], Mapping[str, pd.DataFrame]]", arguments: list[str] | None = None) -> int:
     """The command `python -m studies.STUDY.example`, which writes the recorded pair that ships with the project.
 
     Args:
         study: Name of the study.
         what: Of what the pair is, which is also the name of its folder in `examples`.
-        write: Writes the files to a folder.
+        tables: Simulates the tables of the pair by name.
         arguments: The command line; None: that of the process.
 
     Returns:
@@ -108,10 +87,14 @@ def example_command(study: str, what: str, write: Callable[[Path], None], argume
     """
 
     def run() -> int:
+        from enhsim_tf.common.atomic_files import make_folder, replace_file
+
         parser = Parser(prog=f"python -m studies.{study}.example", description=f"Writes the recorded pair of the {what}.")
         parser.add_argument("folder", type=Path, help=f"the output folder, such as examples/{what}")
-        folder = parser.parse_args(arguments).folder
-        write(folder)
+        folder = make_folder(parser.parse_args(arguments).folder)
+        for name, table in tables().items():
+            with replace_file(folder / f"{name}.csv") as temporary:
+                table.to_csv(temporary, index=False, lineterminator="\n")
         tell(f"telemetry and simulator with and without a fault in {folder}/")
         return 0
 

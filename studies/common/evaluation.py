@@ -7,7 +7,7 @@ false-alarm rate over the nominal rate measures the gap between simulation and r
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.metrics import recall, threshold
 from enhsim_tf.telemetry.windows import time_blocks
 from studies.common.metrics import recall_at_real_rate
+
+_NUM_BLOCKS = 10  # consecutive blocks of time for which false alarms are counted separately
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,9 +57,6 @@ def make_trial(
         seed: Seed for the positions.
         num_anomalous: Number of anomalous windows for each kind and severity, evenly spaced over the nominal windows.
         rate: Nominal false-alarm rate of the thresholds.
-
-    Returns:
-        The trial.
     """
     chosen = nominal[np.linspace(0, len(nominal) - 1, min(num_anomalous, len(nominal))).astype(int)]
     durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
@@ -78,8 +77,6 @@ def evaluate_arm(
     trial: Trial,
     detectors: Mapping[str, Callable[[int], Detector]],
     seed: int,
-    num_blocks: int = 10,
-    on_detector: Callable[[int], None] | None = None,
 ) -> dict[str, list[dict]]:
     """Trains every detector on one arm and evaluates it on real telemetry.
 
@@ -89,19 +86,17 @@ def evaluate_arm(
         trial: Real telemetry for the evaluation.
         detectors: Maps a name to a factory, which takes a seed and returns an unfitted detector.
         seed: Seed for the detectors.
-        num_blocks: Number of consecutive blocks of time for which false alarms are counted separately.
-        on_detector: Called after each detector with the number of completed detectors.
 
     Returns:
         The rows of two tables: `alarms` (detector, block, alarms, windows) and `recall` (detector, kind, severity, recall,
         recall_at_real_rate).
     """
     tables: dict[str, list[dict]] = {"alarms": [], "recall": []}
-    for done, (name, make) in enumerate(detectors.items(), 1):
+    for name, make in detectors.items():
         detector = make(seed).fit(training)
         limit = threshold(detector.score(held_out), trial.rate)
         nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
-        for block, scores in enumerate(np.array_split(nominal, num_blocks)):
+        for block, scores in enumerate(np.array_split(nominal, _NUM_BLOCKS)):
             tables["alarms"].append({"detector": name, "block": block, "alarms": int(np.sum(scores > limit)), "windows": len(scores)})
         all_scores = detector.score(np.concatenate(list(trial.anomalous.values())))
         parts = np.split(all_scores, np.cumsum([len(windows) for windows in trial.anomalous.values()])[:-1])
@@ -115,25 +110,7 @@ def evaluate_arm(
                     "recall_at_real_rate": recall_at_real_rate(reference, scores, trial.rate),
                 }
             )
-        if on_detector is not None:
-            on_detector(done)
     return tables
-
-
-def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:
-    """Computes the false-alarm rate of each detector.
-
-    Args:
-        rows: Rows of the table `alarms`, see `evaluate_arm`.
-
-    Returns:
-        A dictionary from the name of a detector to its false-alarm rate.
-    """
-    names = dict.fromkeys(row["detector"] for row in rows)
-    return {
-        name: sum(row["alarms"] for row in rows if row["detector"] == name) / sum(row["windows"] for row in rows if row["detector"] == name)
-        for name in names
-    }
 
 
 def cross_fitted_scores(make: Callable[[], Detector], windows: np.ndarray, starts: np.ndarray, num_folds: int) -> np.ndarray:

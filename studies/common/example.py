@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.paper import settings as of_paper
 from enhsim_tf.paper import telemetry as of_example
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.telemetry.series import Telemetry
-from studies.common.noise_gallery import GALLERY
+from studies.common.noise_processes import GALLERY
 from studies.common.settings import Settings
 
 
@@ -20,19 +19,14 @@ def draw_noise(kind: str, signal: np.ndarray, sd: float, rng: np.random.Generato
     """Draws noise.
 
     Args:
-        kind: Name of a process in `noise_gallery.GALLERY`.
+        kind: Name of a process in `noise_processes.GALLERY`.
         signal: The signal without noise, shape `(samples,)`, on which one of the processes depends.
         sd: Standard deviation of the noise.
         rng: Random generator.
 
     Returns:
         float64 array of shape `(samples,)`.
-
-    Raises:
-        InputError: If there is no process of that name.
     """
-    if kind not in GALLERY:
-        raise InputError(f"Expected noise of one of the kinds {', '.join(GALLERY)}. Received: {kind!r}.")
     process = GALLERY[kind]
     return sd / process.standard_deviation * process.draw(len(signal), rng, signal)
 

@@ -1,4 +1,4 @@
-"""Measures of detectors that the studies report: recall at the real rate, the volume under a surface, and the share of a gap that is closed.
+"""Measures of detectors that the studies report: recall at the real rate, and the volume under a surface.
 
 Higher scores are more anomalous. Scores are never adjusted by the labels ("point adjustment"), because that makes even random scores look
 good.
@@ -24,23 +24,7 @@ def recall_at_real_rate(real_scores: np.ndarray, anomalous_scores: np.ndarray, r
     return recall(anomalous_scores, threshold(real_scores, rate))
 
 
-def gap_closed(rate: float, simulated_rate: float, real_rate: float) -> float:
-    """Computes the share of the gap between simulation and reality that an arm closes.
-
-    The share is 0 if the arm has the false-alarm rate of the coarse simulation, and 1 if it has that of real telemetry.
-
-    Args:
-        rate: False-alarm rate of detectors trained on the arm, on real nominal windows.
-        simulated_rate: False-alarm rate of detectors trained on the coarse simulation.
-        real_rate: False-alarm rate of detectors trained on real telemetry.
-
-    Returns:
-        The share. It is above 1 if the arm gives fewer false alarms than training on real telemetry, and NaN if there is no gap.
-    """
-    return float((simulated_rate - rate) / (simulated_rate - real_rate)) if simulated_rate != real_rate else float("nan")
-
-
-def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers: int | None = None) -> float:
+def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int) -> float:
     """Volume under the surface of precision, recall and buffer length (VUS-PR, Paparrizos et al. 2022), over all thresholds.
 
     A buffer of length `l` around each anomalous range tolerates scores that rise slightly early or late. A sample at a
@@ -61,7 +45,6 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers:
         scores: Score of each sample, of the same shape.
         max_buffer: Largest buffer length in samples, for example the dominant period. Use the same value for all detectors that
             are compared.
-        num_buffers: Number of evenly spaced buffer lengths from 0 to `max_buffer`. None uses all of them.
 
     Returns:
         The volume, from 0 to 1. Its expected value for random scores is about the mean soft label.
@@ -82,9 +65,8 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers:
     group[order] = np.searchsorted(last, np.arange(len(scores)))
     core = np.cumsum(labels[order])[last]
     distance, edges = _distance(labels), np.flatnonzero(np.diff(labels, prepend=False, append=False)).reshape(-1, 2)
-    lengths = np.arange(max_buffer + 1) if num_buffers is None else np.unique(np.rint(np.linspace(0, max_buffer, num_buffers)).astype(int))
     areas = []
-    for length in lengths:
+    for length in range(max_buffer + 1):
         half = length // 2
         near = np.flatnonzero((distance > 0) & (distance <= half))
         weight = np.zeros(len(scores))

@@ -6,150 +6,128 @@ from typing import Any
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.paper import settings as of_paper
 
-OUR_CHOICE = "our choice"
 
-
-def setting(value: Any, unit: str, source: str, paper: str = "-", smoke: Any = None) -> Any:
-    """A field of a group of settings.
+def setting(value: Any, about: str, smoke: Any = None) -> Any:
+    """A field of a group of settings, all of them choices of this project unless `about` says otherwise.
 
     Args:
         value: Its value at the full budget.
-        unit: Its unit.
-        source: Where the value comes from, and the reason if it is this project's choice.
-        paper: What the paper says; `-` if it says nothing.
+        about: Its unit, and the reason for its value.
         smoke: The value at the smoke budget, if it differs.
     """
-    return dataclasses.field(default=value, metadata={"unit": unit, "source": source, "paper": paper, "smoke": smoke})
+    return dataclasses.field(default=value, metadata={"about": about, "smoke": smoke})
 
 
 @dataclasses.dataclass(frozen=True)
 class RobustnessSettings:
     """The study of robustness: `python -m studies.robustness`."""
 
-    num_seeds: int = setting(5, "seeds", f"{OUR_CHOICE}: four kinds of noise with each", smoke=2)
-    first_seed: int = setting(0, "seed", f"{OUR_CHOICE}: the seeds of the study of readings, whose networks are the same with white noise")
-    num_windows: int = setting(
-        1_000, "windows", f"{OUR_CHOICE}: training windows of each arm; as many held-out windows set its threshold", smoke=200
-    )
+    num_seeds: int = setting(5, "seeds: four kinds of noise with each", smoke=2)
+    first_seed: int = setting(0, "seed: the seeds of the study of readings, whose networks are the same with white noise")
+    num_windows: int = setting(1_000, "windows: training windows of each arm; as many held-out windows set its threshold", smoke=200)
     num_anomalous: int = setting(
-        150,
-        "windows",
-        f"{OUR_CHOICE}: anomalous windows of each kind and severity, the same places for all kinds, severities and arms",
-        smoke=6,
+        150, "windows: anomalous windows of each kind and severity, the same places for all kinds, severities and arms", smoke=6
     )
     num_resplits: int = setting(
-        40, "re-splits", f"{OUR_CHOICE}: maximum number of resamples for the real-vs-real baseline; fewer for expensive measures", smoke=5
+        40, "re-splits: maximum number of resamples for the real-vs-real baseline; fewer for expensive measures", smoke=5
     )
-    false_alarm_rate: float = setting(
-        0.01, "share", f"{OUR_CHOICE}: target rate of each threshold, on held-out windows of the training arm"
-    )
+    false_alarm_rate: float = setting(0.01, "share: target rate of each threshold, on held-out windows of the training arm")
 
 
 @dataclasses.dataclass(frozen=True)
 class SecondSettings:
     """The residual pipeline of the factorial study: noise is the residual of the enhancer, and the convolutional GAN learns it."""
 
-    num_windows: int = setting(
-        15_000, "windows", f"{OUR_CHOICE}: more windows, so that the enhancer does not memorise their noise", smoke=60
-    )
-    epochs: int = setting(2, "epochs", f"{OUR_CHOICE}: fewer epochs: half the paper's steps, with a decaying learning rate")
-    held_out: float = setting(
-        0.0, "share", f"{OUR_CHOICE}: no windows are held out: coarse windows repeat, so the enhancer cannot memorise their noise"
-    )
+    num_windows: int = setting(15_000, "windows: more windows, so that the enhancer does not memorise their noise", smoke=60)
+    epochs: int = setting(2, "epochs: fewer epochs: half the paper's steps, with a decaying learning rate")
+    held_out: float = setting(0.0, "share: kept for the keys of finished runs; coarse windows repeat, so no windows need to be held out")
 
 
 @dataclasses.dataclass(frozen=True)
 class ModesSettings:
     """The detailed test of degraded modes, a part of the study of robustness."""
 
-    num_windows: int = setting(300, "windows", f"{OUR_CHOICE}: test windows in each mode at each severity", smoke=40)
-    num_learnt: int = setting(15_000, "windows", f"{OUR_CHOICE}: of all modes, for the methods that learn from faults", smoke=60)
-    windows_per_configuration: int = setting(50, "windows", f"{OUR_CHOICE}: 300 configurations are sampled", smoke=5)
+    num_windows: int = setting(300, "windows: test windows in each mode at each severity", smoke=40)
+    num_learnt: int = setting(15_000, "windows: of all modes, for the methods that learn from faults", smoke=60)
+    windows_per_configuration: int = setting(50, "windows: 300 configurations are sampled", smoke=5)
 
 
 @dataclasses.dataclass(frozen=True)
 class NoiseModelsSettings:
     """The study of noise models: `python -m studies.noise_models`."""
 
-    num_seeds: int = setting(2, "seeds", f"{OUR_CHOICE}: fourteen families take hours for each seed; --seeds asks for more", smoke=1)
-    first_seed: int = setting(3_008, "seed", f"{OUR_CHOICE}: models and rule were fixed before it")
-    num_windows: int = setting(5_000, "windows", f"{OUR_CHOICE}: windows of true noise that the models learn", smoke=120)
-    num_steps: int = setting(
-        600, "steps", f"{OUR_CHOICE}: of the mixture density network; its error on held-out noise falls no further", smoke=2
-    )
-    num_anomalous: int = setting(30, "windows", f"{OUR_CHOICE}: anomalous windows of each kind and severity", smoke=3)
+    num_seeds: int = setting(2, "seeds: fourteen families take hours for each seed; --seeds asks for more", smoke=1)
+    first_seed: int = setting(3_008, "seed: models and rule were fixed before it")
+    num_windows: int = setting(5_000, "windows: windows of true noise that the models learn", smoke=120)
+    num_steps: int = setting(600, "steps: of the mixture density network; its error on held-out noise falls no further", smoke=2)
+    num_anomalous: int = setting(30, "windows: anomalous windows of each kind and severity", smoke=3)
 
 
 @dataclasses.dataclass(frozen=True)
 class FewWindowsSettings:
     """The study of few windows: `python -m studies.few_windows`."""
 
-    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the experiment on robustness", smoke=1)
-    first_seed: int = setting(4_000, "seed", f"{OUR_CHOICE}: no design was chosen on these seeds")
+    num_seeds: int = setting(10, "seeds: as in the experiment on robustness", smoke=1)
+    first_seed: int = setting(4_000, "seed: no design was chosen on these seeds")
     num_real: tuple[int, ...] = setting(
-        (5, 10, 20, 50, 100, 300, 1_000, 10_000), "windows", f"{OUR_CHOICE}: disjoint windows of the real record", smoke=(5, 20)
+        (5, 10, 20, 50, 100, 300, 1_000, 10_000), "windows: disjoint windows of the real record", smoke=(5, 20)
     )
-    num_windows: int = setting(1_500, "windows", f"{OUR_CHOICE}: most windows for training, as many as the paper's enhancer", smoke=60)
-    num_judged: int = setting(1_000, "windows", f"{OUR_CHOICE}: disjoint test windows, and as many for the matched rate", smoke=40)
-    num_anomalous: int = setting(60, "windows", f"{OUR_CHOICE}: test windows with an anomaly of each kind", smoke=6)
+    num_windows: int = setting(1_500, "windows: most windows for training, as many as the paper's enhancer", smoke=60)
+    num_judged: int = setting(1_000, "windows: disjoint test windows, and as many for the matched rate", smoke=40)
+    num_anomalous: int = setting(60, "windows: test windows with an anomaly of each kind", smoke=6)
 
 
 @dataclasses.dataclass(frozen=True)
 class FactorialSettings:
     """The factorial study: `python -m studies.factorial`. Its other settings are those of robustness."""
 
-    num_seeds: int = setting(5, "seeds", f"{OUR_CHOICE}: 32 cells for each", smoke=1)
-    first_seed: int = setting(2_000, "seed", f"{OUR_CHOICE}: designs were chosen on 100 to 199")
-    max_order: int = setting(200, "samples", f"{OUR_CHOICE}: largest order of the fitted autoregression; AIC selects the order", smoke=40)
+    num_seeds: int = setting(5, "seeds: 32 cells for each", smoke=1)
+    first_seed: int = setting(2_000, "seed: designs were chosen on 100 to 199")
+    max_order: int = setting(200, "samples: largest order of the fitted autoregression; AIC selects the order", smoke=40)
 
 
 @dataclasses.dataclass(frozen=True)
 class SpacecraftSettings:
     """The study of real telemetry with labelled anomalies: `python -m studies.spacecraft`."""
 
-    num_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: networks and detectors are trained with each", smoke=1)
-    first_seed: int = setting(0, "seed", f"{OUR_CHOICE}: the first one")
-    num_windows: int = setting(2_500, "windows", f"{OUR_CHOICE}: about every offset in a channel of the data set once", smoke=60)
-    epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1)
-    num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
-    num_arm_windows: int = setting(
-        2_000, "windows", f"{OUR_CHOICE}: training windows of each arm; as many held-out windows set its threshold", smoke=200
-    )
-    num_folds: int = setting(
-        5, "blocks of time", f"{OUR_CHOICE}: real windows set thresholds in the block that a detector was not fitted to", smoke=3
-    )
-    false_alarm_rate: float = setting(0.01, "share", f"{OUR_CHOICE}: as in the experiment on robustness")
-    block: int = setting(50, "samples", f"{OUR_CHOICE}: block length of the bootstrap: half a period")
+    num_seeds: int = setting(3, "seeds: networks and detectors are trained with each", smoke=1)
+    first_seed: int = setting(0, "seed: the first one")
+    num_windows: int = setting(2_500, "windows: about every offset in a channel of the data set once", smoke=60)
+    epochs: int = setting(6, "epochs: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1)
+    num_iterations: int = setting(1_000, "iterations: around 1,000 in the paper, section 2.3", smoke=4)
+    num_arm_windows: int = setting(2_000, "windows: training windows of each arm; as many held-out windows set its threshold", smoke=200)
+    num_folds: int = setting(5, "blocks of time: real windows set thresholds in the block that a detector was not fitted to", smoke=3)
+    false_alarm_rate: float = setting(0.01, "share: as in the experiment on robustness")
+    block: int = setting(50, "samples: block length of the bootstrap: half a period")
 
 
 @dataclasses.dataclass(frozen=True)
 class BatterySettings:
     """The study of a pair of battery simulators: `python -m studies.battery`."""
 
-    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the experiment on robustness", smoke=1)
-    first_seed: int = setting(3_000, "seed", f"{OUR_CHOICE}: designs were chosen on seeds below")
-    fit_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days of telemetry, to which the simulator is fitted", smoke=4)
-    more_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: as many again, for detectors trained on more real telemetry", smoke=4)
-    test_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days on which everything is judged", smoke=4)
-    coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
-    fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
-    paper_epochs: int = setting(40, "epochs", "paper, section 2.2", "40", smoke=1)
+    num_seeds: int = setting(10, "seeds: as in the experiment on robustness", smoke=1)
+    first_seed: int = setting(3_000, "seed: designs were chosen on seeds below")
+    fit_orbits: int = setting(60, "orbits: four days of telemetry, to which the simulator is fitted", smoke=4)
+    more_orbits: int = setting(60, "orbits: as many again, for detectors trained on more real telemetry", smoke=4)
+    test_orbits: int = setting(60, "orbits: four days on which everything is judged", smoke=4)
+    coarse_orbits: int = setting(120, "orbits: coarse runs from which training data are generated", smoke=8)
+    fault_orbits: int = setting(4, "orbits: orbits under each fault at each severity, in both simulators", smoke=1)
 
 
 @dataclasses.dataclass(frozen=True)
 class ReferenceOrSourceSettings:
     """The study of what a simulator is worth having for: `python -m studies.reference_or_source`."""
 
-    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the other studies", smoke=1)
-    first_seed: int = setting(5_000, "seed", f"{OUR_CHOICE}: designs were chosen on seed 900")
+    num_seeds: int = setting(10, "seeds: as in the other studies", smoke=1)
+    first_seed: int = setting(5_000, "seed: designs were chosen on seed 900")
     known_windows: tuple[int, ...] = setting(
-        (30, 100, 300, 1_000), "windows", f"{OUR_CHOICE}: that share no sample, of at least three flights or orbits", smoke=(30, 40)
+        (30, 100, 300, 1_000), "windows: that share no sample, of at least three flights or orbits", smoke=(30, 40)
     )
-    middle: int = setting(100, "windows", f"{OUR_CHOICE}: known windows where the other axes are tried", smoke=30)
-    test_windows: int = setting(300, "windows", f"{OUR_CHOICE}: nominal time on which false alarms are counted", smoke=20)
-    source_windows: int = setting(300, "windows", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=20)
-    parameter_windows: int = setting(20, "windows", f"{OUR_CHOICE}: telemetry to which parameters of the simulator are fitted", smoke=5)
-    fault_windows: int = setting(20, "windows", f"{OUR_CHOICE}: under each fault at each severity", smoke=5)
+    middle: int = setting(100, "windows: known windows where the other axes are tried", smoke=30)
+    test_windows: int = setting(300, "windows: nominal time on which false alarms are counted", smoke=20)
+    source_windows: int = setting(300, "windows: coarse runs from which training data are generated", smoke=20)
+    parameter_windows: int = setting(20, "windows: telemetry to which parameters of the simulator are fitted", smoke=5)
+    fault_windows: int = setting(20, "windows: under each fault at each severity", smoke=5)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -157,7 +135,7 @@ class Settings:
     """The settings of the paper's pipeline, the kind of noise in its telemetry, and the settings of each study."""
 
     paper: of_paper.Settings
-    noise: str = setting("white", "kind of noise", f"{OUR_CHOICE}: the simplest; `environments.FAMILIES` has others")
+    noise: str = setting("white", "kind of noise: the simplest; `environments.FAMILIES` has others")
     second: SecondSettings = SecondSettings()
     robustness: RobustnessSettings = RobustnessSettings()
     modes: ModesSettings = ModesSettings()

@@ -22,25 +22,20 @@ class KeptTables:
         names: Names of the tables.
         labels: Columns with few distinct values, which are stored as dictionaries.
         digits: Decimals that numbers are rounded to.
-        kind: Word for messages: an `experiment` or a `study`.
         command: The command that produces them.
         digits_of: Decimals of tables that differ from `digits`.
+        kind: Word for messages.
     """
 
     names: tuple[str, ...]
     labels: tuple[str, ...]
     digits: int
-    kind: str
     command: str
     digits_of: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    kind: str = "study"
 
     def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
-        """Writes all tables: labels as dictionaries, and numbers rounded to the precision that their counts support.
-
-        Args:
-            tables: By name.
-            folder: An existing folder.
-        """
+        """Writes tables by name to a folder: labels as dictionaries, and numbers rounded to the precision that their counts support."""
         for name, table in tables.items():
             compact = table.reset_index(drop=True)
             for column in compact.columns:

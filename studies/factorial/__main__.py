@@ -1,10 +1,28 @@
 """`python -m studies.factorial`: which part of the pipeline lowers false alarms."""
 
+import argparse
 import sys
+from pathlib import Path
+from typing import Any
 
-from studies.common.environments import noise_command
+from studies.common.command import Command
+from studies.common.environments import NOISES, environment_option, environments
 
-command = noise_command("factorial", "Combines windows, extraction, enhancer and generator of two pipelines and counts false alarms.")
+
+def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]:
+    """Runs the study and returns its findings."""
+    from studies.common.replicates import run_study
+    from studies.factorial.pipelines import Pipelines
+    from studies.robustness.replicate import Replicate
+
+    def tables_of(environment: str, seed: int, stages: Any) -> dict[str, Any]:
+        return Pipelines(Replicate(settings.of(environment, seed), stages)).tables()
+
+    return run_study("factorial", tables_of, environments(options, NOISES), options, settings, out)
+
+
+description = "Combines windows, extraction, enhancer and generator of two pipelines and counts false alarms."
+command = Command("factorial", description, environment_option(NOISES), run)
 
 if __name__ == "__main__":
     sys.exit(command())

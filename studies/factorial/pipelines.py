@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise.surrogates import GaussianAutoregression
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
-from enhsim_tf.telemetry.windows import random_window_starts
+from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
 from studies.common import evaluation
 from studies.factorial.cells import (
     AUTOREGRESSION,
@@ -26,7 +27,6 @@ from studies.factorial.cells import (
     Cell,
     cells_by_source,
 )
-from studies.factorial.second_pipeline import SecondPipeline, paired_windows
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
@@ -50,7 +50,6 @@ class Pipelines:
     def __init__(self, replicate: Replicate):
         self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
         self.example = replicate.example
-        self.second = SecondPipeline(self.example, self.settings, self.stages)
         self.window, self.seed = self.settings.paper.window, self.settings.seed
         self.enhancer = functools.cache(self._enhancer)
         self.extracted = functools.lru_cache(maxsize=1)(self._extracted)
@@ -126,15 +125,39 @@ class Pipelines:
         return random_window_starts([self.example.train], self.window, self.number(windows), rng)
 
     def pairs(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coarse windows and telemetry of the training part."""
-        return paired_windows(self.example.train, self.example.coarse, starts, self.window)
+        """Coarse windows and telemetry of the training part, float32 of shape `(windows, samples)`, that begin at these samples."""
+        train = self.example.train
+        times = train.offset_s + train.interval_s * (starts[:, None] + np.arange(self.window))
+        return self.example.coarse.simulate(times), cut_windows(train.values, starts, self.window)
 
     def _enhancer(self, enhancer: str, windows: str) -> Enhance:
         """The function that maps coarse windows to the signal of an enhancer."""
         if enhancer == RIDGE:
             starts = self.training_starts(windows)
             return fit_ridge(*self.pairs(starts), starts).predict
-        return self.example.enhance if windows == FEW else self.second.simulator.enhance
+        return self.example.enhance if windows == FEW else self.second_network
+
+    @functools.cached_property
+    def second_network(self) -> Enhance:
+        """The network of the residual pipeline, which is trained on more windows in fewer epochs."""
+        from enhsim_tf.enhancer.model import Enhancer
+
+        _ = self.example.telemetry
+        depends = (self.settings.paper.of("windows"), self.settings.second)
+        folder = self.stages.run("second network", self._train_second, depends, ("telemetry",), version=2)
+        with np.load(folder / "enhancer.npz") as arrays:
+            sizes = {"name": NETWORK, "window": self.window, "columns": 1, "channels": 1}
+            enhancer = Enhancer.from_arrays(sizes, dict(arrays))
+        return lambda coarse: enhancer.predict(coarse[:, :, None])[:, :, 0]
+
+    def _train_second(self, folder: Path) -> None:
+        from enhsim_tf.enhancer.candidates import fit_enhancer
+
+        self.stages.progress.step("enhancer network")
+        starts = self.training_starts(MANY)
+        np.savez(
+            folder / "enhancer.npz", **fit_enhancer(NETWORK, *self.pairs(starts), starts, self.seed, self.settings.second.epochs).arrays
+        )
 
     def _extracted(self, windows: str, extraction: str, enhancer: str) -> np.ndarray:
         """Windows of the noise that a generator learns, of shape `(windows, samples)`; the arguments are `Cell.source`."""
@@ -167,6 +190,6 @@ class Pipelines:
         return fit_convolutional_gan(noise, self.settings.paper.iterations, self.seed)
 
     def _paper_gan(self, noise: np.ndarray) -> "PaperGAN":
-        from studies.common.paper_gan import fit_paper_gan
+        from studies.common.paper_gan import PaperGAN
 
-        return fit_paper_gan(noise, self.settings.paper)
+        return PaperGAN(noise, self.settings.paper)

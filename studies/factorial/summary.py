@@ -17,7 +17,6 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from studies.common.environments import NOISES
-from studies.common.metrics import gap_closed
 from studies.common.statistics import mean_interval, t_interval
 from studies.common.tables import KeptTables
 from studies.factorial.cells import (
@@ -53,7 +52,7 @@ CONTRASTS = {
     "few, many": (Cell(FEW, RESIDUAL, RIDGE, WHOLE_WINDOWS).name, WITHOUT_NETWORK.name),
 }
 """Differences in false alarms and recall that the conclusions use: the first cell minus the second."""
-KEPT = KeptTables(("cells",), labels=("environment", "cell", "detector"), digits=4, kind="study", command="python -m studies.factorial")
+KEPT = KeptTables(("cells",), labels=("environment", "cell", "detector"), digits=4, command="python -m studies.factorial")
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
@@ -86,7 +85,7 @@ def averaged(table: "pd.DataFrame") -> "dict[str, pd.DataFrame]":
     """Means over detectors: the false-alarm rate and both outcomes; replicates in rows and cells in columns."""
     groups = table.assign(rate=table["alarms"] / table["windows"]).groupby([*REPLICATE, "cell"])
     rate, recall = (groups[name].mean().unstack("cell") for name in ("rate", "recall_at_real_rate"))
-    gap = rate.apply(lambda row: [gap_closed(each, row["coarse"], row["real"]) for each in row], axis=1, result_type="broadcast")
+    gap = rate.rsub(rate["coarse"], axis=0).div(rate["coarse"] - rate["real"], axis=0)  # NaN or infinite if there is no gap
     return {"false_alarms": rate, "gap_closed": gap, "recall_at_real_rate": recall}
 
 

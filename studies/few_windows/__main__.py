@@ -24,7 +24,7 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
 
 
 description = "Varies the number of real windows from which detectors and simulators learn."
-command = Command("few_windows", description, "few_windows", run, [environment_option(NOISES)])
+command = Command("few_windows", description, environment_option(NOISES), run)
 
 if __name__ == "__main__":
     sys.exit(command())

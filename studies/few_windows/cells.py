@@ -20,7 +20,7 @@ from studies.common.evaluation import cross_fitted_scores
 from studies.common.example import coarse_simulator, draw_noise
 from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import Settings
-from studies.few_windows.record import CORAL, NOISE_MODELS, NUM_BLOCKS, REAL, SIMULATOR, CoralAlignment, Record
+from studies.few_windows.record import CORAL, NOISE_MODELS, NUM_BLOCKS, REAL, SIMULATOR, Record, coral_alignment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,8 +98,8 @@ class World:
         # The map whitens the windows that it is fitted to better than others, so training and threshold use other windows than these.
         numbers = (_CORAL_SOURCE * number, number, number)
         source, *others = (record.generate("gaussian", each, _CORAL + 100 * place) for place, each in enumerate(numbers))
-        alignment = CoralAlignment.fit(source, real)
-        generated[CORAL] = [alignment.apply(windows) for windows in others]
+        align = coral_alignment(source, real)
+        generated[CORAL] = [align(windows) for windows in others]
         for arm, (training, held_out) in generated.items():
             for name in QUICK:
                 score = DETECTORS[name](seed).fit(training).score

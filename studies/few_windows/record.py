@@ -12,7 +12,6 @@ windows, and all training data are cut from the same overlapping windows of it, 
   the windows that train the detectors, which the map whitens better than others; thresholds were too high.
 """
 
-import dataclasses
 import functools
 from collections.abc import Callable
 
@@ -72,27 +71,14 @@ class Record:
         return clean + fit_candidate(name, *self.residuals, self.starts).generate(num_windows, rng, clean)
 
 
-@dataclasses.dataclass(frozen=True)
-class CoralAlignment:
-    """Correlation alignment: a linear map that gives windows the mean and covariance of other windows.
+def coral_alignment(source: np.ndarray, target: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Correlation alignment: a linear map that gives source windows the mean and covariance of target windows, `(windows, samples)`.
 
-    Covariances are shrunk towards their mean variance, because a short record does not determine them. The matrix `transfer` whitens the
-    source and colours it as the target.
+    Covariances are shrunk towards their mean variance, because a short record does not determine them. The map whitens the source and
+    colours it as the target; it returns float32.
     """
-
-    source_mean: np.ndarray
-    target_mean: np.ndarray
-    transfer: np.ndarray
-
-    @classmethod
-    def fit(cls, source: np.ndarray, target: np.ndarray) -> "CoralAlignment":
-        """Fits the alignment of source windows with target windows, both of shape `(windows, samples)`."""
-        whiten = _power(_covariance(source), -0.5)
-        return cls(source.mean(axis=0), target.mean(axis=0), whiten @ _power(_covariance(target), 0.5))
-
-    def apply(self, windows: np.ndarray) -> np.ndarray:
-        """Maps windows of the source; returns float32 of the same shape."""
-        return ((windows - self.source_mean) @ self.transfer + self.target_mean).astype(np.float32)
+    transfer = _power(_covariance(source), -0.5) @ _power(_covariance(target), 0.5)
+    return lambda windows: ((windows - source.mean(axis=0)) @ transfer + target.mean(axis=0)).astype(np.float32)
 
 
 def _covariance(windows: np.ndarray) -> np.ndarray:

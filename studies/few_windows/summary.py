@@ -18,7 +18,6 @@ KEPT = KeptTables(
     names=("rows",),
     labels=("environment", "arm", "detector"),
     digits=4,
-    kind="study",
     command="python -m studies.few_windows",
 )
 RATE = 0.01

@@ -21,7 +21,7 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
 
 
 description = "Tries noise models on fourteen families of noise."
-command = Command("noise_models", description, "noise_models", run, [environment_option(FAMILIES)])
+command = Command("noise_models", description, environment_option(FAMILIES), run)
 
 if __name__ == "__main__":
     sys.exit(command())

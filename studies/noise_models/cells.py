@@ -19,6 +19,7 @@ from enhsim_tf.simulator.noise_choice import MOST_JUDGED, HeldOutJudge, NoiseWin
 from studies.common import evaluation
 from studies.common.settings import Settings
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
+from studies.noise_models.real_floor import RealFloor, Row
 from studies.noise_models.summary import KEPT, REAL
 from studies.robustness.replicate import Replicate
 
@@ -65,7 +66,7 @@ class Cell:
     def _make(self, model: str, folder: Path) -> None:
         import pandas as pd
 
-        floor, held_out = self.one.floor()
+        floor, held_out = self._floor()
         if model == REAL:
             number = self.settings.robustness.num_windows
             arms = [self.example.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
@@ -95,6 +96,14 @@ class Cell:
         learner = MixtureDensityNoise(self.settings.seed, self.settings.noise_models.num_steps)
         return learner.fit(self._learnt.noise, self._learnt.clean, self._learnt.starts)
 
+    def _floor(self) -> tuple[RealFloor, np.ndarray]:
+        """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample."""
+        every = (self.example.windows(part, None) for part in ("test", "train", "calibration"))
+        samples = [windows["target"] - windows["truth"] for windows in every]
+        number = min(self.settings.robustness.num_windows, *map(len, samples))
+        real, again, held_out = (noise[:number] for noise in samples)
+        return RealFloor(real, again, self.settings.robustness.num_resplits, self.settings.seed), held_out
+
     def _detected(self, arms: list[np.ndarray]) -> list[dict]:
         """False alarms and recall of every detector, trained on the first windows, with the threshold of the second ones."""
         trial = self.one.trial(self.settings.noise_models.num_anomalous)
@@ -123,9 +132,9 @@ class Cell:
         return HeldOutJudge(self._learnt, self._with_noise("calibration", number, "ladder, judged"), self.settings.seed)
 
 
-def _measured(floor: object, compared: list[np.ndarray]) -> "pd.DataFrame":
+def _measured(floor: RealFloor, compared: list[np.ndarray]) -> "pd.DataFrame":
     """Measures of realism, means over draws; what cannot be computed once has no mean."""
     import pandas as pd
 
-    rows = [{"measure": row.measure, "value": row.value, "ratio": row.ratio} for each in compared for row in floor.evaluate(each).rows]
-    return pd.DataFrame(rows).groupby("measure", sort=False).agg(lambda each: each.mean(skipna=False)).reset_index()
+    rows = [row for each in compared for row in floor.evaluate(each)]
+    return pd.DataFrame(rows, columns=Row._fields).groupby("measure", sort=False).agg(lambda each: each.mean(skipna=False)).reset_index()

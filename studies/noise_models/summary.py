@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.simulator.noise_choice import MAX_ALARM_EXCESS, MAX_RECALL_LOSS, CandidateJudgement, choose
-from studies.common.noise_gallery import LOOKED_AT
+from studies.common.noise_processes import LOOKED_AT
 from studies.common.tables import KeptTables
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ KEPT = KeptTables(
     names=("detectors", "realism", "choice"),
     labels=("family", "model", "detector", "measure"),
     digits=4,
-    kind="study",
     command="python -m studies.noise_models",
 )
 MAX_REALISM_RATIO = 3.0  # of a measure to its value between two samples of real noise

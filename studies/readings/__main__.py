@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.common.atomic_files import make_folder, write_json
     from enhsim_tf.common.stages import default_cache
     from enhsim_tf.paper.report import PUBLISHED
-    from studies.common.figures import save_all
+    from studies.common.replicates import save_all
     from studies.readings.figure import FIGURES
     from studies.readings.run import collect, runs
     from studies.readings.summary import publish, shares, verdicts

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
+from studies.battery.faults import measure
 from studies.reference_or_source.aircraft_faults import ALL, ONSET, UNIT_SAMPLES, Fault, sizes_over_flight
-from studies.reference_or_source.aircraft_flight import Vehicle, check_installed, draw_wind, fly
+from studies.reference_or_source.aircraft_flight import Vehicle, draw_wind, fly, import_jsbsim
 from studies.reference_or_source.aircraft_point_mass import Constants, simulate
 
 COMMANDS = ("target altitude", "target airspeed")
@@ -33,8 +33,7 @@ NOISE_SD = (0.5, 30.0, 0.05, 0.1, 0.1, 6.0)
 RESOLUTION = (0.25, 16.0, 0.05, 0.1, 0.1, 4.0)
 """Resolution of each channel's sensor, in the channel's unit."""
 _HOLDS_S = (60, 120)  # shortest and longest time between two steps of a target; the mean is 90 s
-_ALTITUDES_FT, _ALTITUDE_STEP_FT, _ALTITUDE_GRID_FT = (8_000, 16_000), 1_500, 100
-_SPEEDS_KT, _SPEED_STEP_KT, _SPEED_GRID_KT = (230, 290), 20, 1
+_TARGETS = ((8_000, 16_000), 1_500, 100), ((230, 290), 20, 1)  # limits, largest step and grid of altitude in feet and airspeed in knots
 
 
 class Aircraft:
@@ -60,31 +59,16 @@ class Aircraft:
     steps, bounds = first_values / 2, (-1.8, 6.0)
     """Unit of each parameter in the fit, and the limits of its change in these units."""
 
-    def check_installed(self) -> None:
-        """Raises an `InputError` if JSBSim is not installed."""
-        check_installed()
+    check_installed = staticmethod(import_jsbsim)
 
     def draw_commands(self, num_units: int, rng: np.random.Generator) -> np.ndarray:
-        """Draws targets, each of which takes a random step every 60 to 120 seconds.
-
-        Args:
-            num_units: Number of flights.
-            rng: Random number generator.
+        """Draws targets of some flights, each of which takes a random step every 60 to 120 seconds.
 
         Returns:
             Target altitude in feet and airspeed in knots, float64 of shape `(num_units * unit_samples, 2)`.
         """
-        flights = [
-            np.stack(
-                [
-                    _draw_target(_ALTITUDES_FT, _ALTITUDE_STEP_FT, _ALTITUDE_GRID_FT, rng),
-                    _draw_target(_SPEEDS_KT, _SPEED_STEP_KT, _SPEED_GRID_KT, rng),
-                ],
-                axis=1,
-            )
-            for _ in range(num_units)
-        ]
-        return np.concatenate(flights) if flights else np.empty((0, len(COMMANDS)))
+        drawn = [_draw_target(*each, rng) for _ in range(num_units) for each in _TARGETS]
+        return np.reshape(drawn, (num_units, len(_TARGETS), UNIT_SAMPLES)).swapaxes(1, 2).reshape(-1, len(_TARGETS))
 
     def run_real(
         self, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), rng: np.random.Generator | None = None
@@ -101,7 +85,7 @@ class Aircraft:
             airspeed, and the autopilot flies by it.
 
         Raises:
-            InputError: If JSBSim is not installed, or `commands` are no whole number of flights, or cannot be flown.
+            InputError: If JSBSim is not installed, or `commands` cannot be flown.
         """
         flights = _as_flights(commands)
         winds = [None] * len(flights) if rng is None else [draw_wind(own) for own in rng.spawn(len(flights))]
@@ -123,7 +107,7 @@ class Aircraft:
             `(samples, 8)`.
 
         Raises:
-            InputError: If JSBSim is not installed although the simulator needs it, or `commands` are no whole number of flights.
+            InputError: If JSBSim is not installed although the simulator needs it.
         """
         flights, found = _as_flights(commands), []
         for fault in faults:
@@ -140,19 +124,8 @@ class Aircraft:
         return simulator in VEHICLES or kind != "elevator"
 
     def measure(self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
-        """Measures channels with sensors that add white noise and round to their resolution.
-
-        Args:
-            values: Channels, shape `(samples, 6)`.
-            rng: Random number generator.
-            scale: Factor of the noise; 0 leaves the rounding only.
-
-        Returns:
-            Telemetry, float32 of the same shape.
-        """
-        steps = np.array(RESOLUTION)
-        noisy = values + scale * np.array(NOISE_SD) * rng.standard_normal(np.shape(values))
-        return (np.rint(noisy / steps) * steps).astype(np.float32)
+        """Measures channels of shape `(samples, 6)` with sensors that add white noise, times `scale`, and round; returns float32."""
+        return measure(values, scale * np.array(NOISE_SD), np.array(RESOLUTION), rng)
 
 
 def _draw_target(limits: tuple[int, int], step: int, grid: int, rng: np.random.Generator) -> np.ndarray:
@@ -169,16 +142,11 @@ def _draw_target(limits: tuple[int, int], step: int, grid: int, rng: np.random.G
 
 
 def _as_flights(commands: np.ndarray) -> np.ndarray:
-    """Returns commands as `(flights, UNIT_SAMPLES, 2)`."""
-    if commands.ndim != 2 or commands.shape[1] != len(COMMANDS) or len(commands) % UNIT_SAMPLES:
-        raise InputError(
-            f"Expected commands of shape (flights * {UNIT_SAMPLES}, {len(COMMANDS)}). Received: {commands.shape}. Draw them with draw_commands."
-        )
-    return np.asarray(commands, dtype=float).reshape(-1, UNIT_SAMPLES, len(COMMANDS))
+    """Commands as `(flights, UNIT_SAMPLES, 2)`."""
+    return commands.astype(float).reshape(-1, UNIT_SAMPLES, len(COMMANDS))
 
 
 def _fly_all(flights: np.ndarray, vehicle: Vehicle, fault: Fault | None, winds: list[np.ndarray | None]) -> np.ndarray:
     """Runs JSBSim over flights, each with a simulator of its own, so that no flight depends on the ones before it."""
     sizes = sizes_over_flight(fault)
-    runs = [fly(targets, vehicle, sizes, wind) for targets, wind in zip(flights, winds, strict=True)]
-    return np.concatenate(runs).astype(np.float32) if runs else np.empty((0, len(Aircraft.channels)), dtype=np.float32)
+    return np.concatenate([fly(targets, vehicle, sizes, wind) for targets, wind in zip(flights, winds, strict=True)]).astype(np.float32)

@@ -28,6 +28,15 @@ _DRAG_OF_SPEEDBRAKE = 0.04  # drag coefficient of the whole speed brake, which s
 _DRAG_AT_ZERO_LIFT = 0.016
 _WINDS = ((1.0, 8.0), (0.8, 4.0))  # standard deviation in feet a second and correlation time in seconds, along and vertical
 
+_READ = (
+    "position/h-sl-ft", "velocities/h-dot-fps", "velocities/vc-kts", "velocities/vtrue-fps", "attitude/theta-rad", "velocities/q-rad_sec",
+    "attitude/phi-rad", "velocities/p-rad_sec", "attitude/psi-rad", "propulsion/engine[0]/n1", "propulsion/engine[1]/n1",
+)  # fmt: skip
+_WRITTEN = (
+    "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/throttle-cmd-norm[0]", "fcs/throttle-cmd-norm[1]", "atmosphere/gust-north-fps",
+    "atmosphere/gust-down-fps",
+)  # fmt: skip
+
 
 @dataclasses.dataclass(frozen=True)
 class Vehicle:
@@ -49,8 +58,12 @@ class Vehicle:
 
 
 @functools.cache
-def _jsbsim() -> Any:
-    """Imports JSBSim, silenced."""
+def import_jsbsim() -> Any:
+    """Imports JSBSim, silenced.
+
+    Raises:
+        InputError: If it is not installed.
+    """
     try:
         import jsbsim
     except ImportError:
@@ -61,33 +74,16 @@ def _jsbsim() -> Any:
     return jsbsim
 
 
-def check_installed() -> None:
-    """Checks that JSBSim can be imported.
-
-    Raises:
-        InputError: If it is not installed.
-    """
-    _jsbsim()
-
-
 def draw_wind(rng: np.random.Generator) -> np.ndarray:
     """Draws light turbulence over one flight, first-order Gauss-Markov processes.
-
-    Args:
-        rng: Random number generator.
 
     Returns:
         Wind along the heading and vertical wind in feet a second, shape `(UNIT_SAMPLES * CONTROLS_A_SECOND, 2)`.
     """
-    from scipy.signal import lfilter
+    from studies.common.noise_processes import first_order
 
-    columns = []
-    for sd, time_s in _WINDS:
-        keeps = np.exp(-1 / (time_s * CONTROLS_A_SECOND))
-        draws = rng.standard_normal(UNIT_SAMPLES * CONTROLS_A_SECOND) * np.sqrt(1 - keeps**2)
-        draws[0] /= np.sqrt(1 - keeps**2)  # the first value has the standard deviation of the others
-        columns.append(sd * lfilter([1.0], [1.0, -keeps], draws))
-    return np.stack(columns, axis=1)
+    number = UNIT_SAMPLES * CONTROLS_A_SECOND
+    return np.stack([sd * first_order(number, np.exp(-1 / (time_s * CONTROLS_A_SECOND)), rng) for sd, time_s in _WINDS], axis=1)
 
 
 def fly(targets: np.ndarray, vehicle: Vehicle, sizes: dict[str, np.ndarray], wind: np.ndarray | None) -> np.ndarray:
@@ -109,32 +105,9 @@ def fly(targets: np.ndarray, vehicle: Vehicle, sizes: dict[str, np.ndarray], win
     model = _trimmed(*targets[0].tolist(), vehicle)
     nodes = model.get_property_manager()
     altitude, climb, airspeed, true_speed, pitch, pitch_rate, roll, roll_rate, heading, n1_left, n1_right = (
-        nodes.get_node(name).get_double_value
-        for name in (
-            "position/h-sl-ft",
-            "velocities/h-dot-fps",
-            "velocities/vc-kts",
-            "velocities/vtrue-fps",
-            "attitude/theta-rad",
-            "velocities/q-rad_sec",
-            "attitude/phi-rad",
-            "velocities/p-rad_sec",
-            "attitude/psi-rad",
-            "propulsion/engine[0]/n1",
-            "propulsion/engine[1]/n1",
-        )
+        nodes.get_node(name).get_double_value for name in _READ
     )
-    put_elevator, put_aileron, put_left, put_right, put_along, put_down = (
-        nodes.get_node(name).set_double_value
-        for name in (
-            "fcs/elevator-cmd-norm",
-            "fcs/aileron-cmd-norm",
-            "fcs/throttle-cmd-norm[0]",
-            "fcs/throttle-cmd-norm[1]",
-            "atmosphere/gust-north-fps",
-            "atmosphere/gust-down-fps",
-        )
-    )
+    put_elevator, put_aileron, put_left, put_right, put_along, put_down = (nodes.get_node(name).set_double_value for name in _WRITTEN)
     trimmed_elevator, trimmed_throttle = model["fcs/pitch-trim-cmd-norm"] / vehicle.elevator, model["fcs/throttle-cmd-norm"]
     model["fcs/pitch-trim-cmd-norm"] = 0.0  # the elevator's command holds the trim, so that a fault of the elevator reaches it
     trimmed_pitch, wanted_speed, seen_speed = pitch(), airspeed(), airspeed()
@@ -179,7 +152,7 @@ def _limit(value: float, most: float) -> float:
 
 def _trimmed(altitude_ft: float, airspeed_kt: float, vehicle: Vehicle) -> Any:
     """Returns a simulator of its own, so that flights are independent, that is trimmed for level flight to the north."""
-    jsbsim = _jsbsim()
+    jsbsim = import_jsbsim()
     model = jsbsim.FGFDMExec(None)
     model.set_debug_level(0)
     model.load_model("A320")

@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.battery.faults import ALL, SENSOR_NOISE_C, SENSOR_NOISE_V, SENSOR_STEP_C, SENSOR_STEP_V, Fault, measure
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, draw_load
-from studies.battery.simulate import COARSE, VEHICLE, Model, check_installed, simulate_all
+from studies.battery.simulate import COARSE, VEHICLE, Model, import_pybamm, simulate_all
 
 SENSOR_NOISE_A, SENSOR_STEP_A = 0.02, 20.0 / 4096
 """Standard deviation of the current sensor's noise in amperes, and its resolution: 12 bits over 20 A."""
@@ -52,9 +52,7 @@ class Battery:
     first_values, steps, bounds = np.zeros(3), np.array([0.01, 0.05, 0.3]), ((-1e-9, -1e-9, -3.0), (5.0, 4.0, 3.0))
     """Published values of `parameters`, the unit of each in the fit, and the limits in these units."""
 
-    def check_installed(self) -> None:
-        """Raises an `InputError` if PyBaMM is not installed."""
-        check_installed()
+    check_installed = staticmethod(import_pybamm)
 
     def draw_commands(self, num_units: int, rng: np.random.Generator) -> np.ndarray:
         """Draws the load of so many orbits and one before them, shape `(samples, 1)`."""
@@ -63,28 +61,17 @@ class Battery:
     def run_real(
         self, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), rng: np.random.Generator | None = None
     ) -> list[np.ndarray]:
-        """Runs the fine simulator, without noise of the sensors.
-
-        Args:
-            commands: As `draw_commands` returns them.
-            faults: Faults, which act from the beginning of the run; None for nominal.
-            rng: Not used: the load is all that moves a battery.
+        """Runs the fine simulator, see `Aircraft.run_real`; the load is all that moves a battery, so that nothing is drawn.
 
         Returns:
-            For each fault, float32 array of shape `(samples, 3)`, without the first orbit.
+            For each fault, which acts from the beginning of the run, float32 array of shape `(samples, 3)`, without the first orbit.
         """
         return self._run(VEHICLE, commands, faults)
 
     def run_coarse(
         self, simulator: str, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), values: Sequence[float] | None = None
     ) -> list[np.ndarray]:
-        """Runs a coarse simulator.
-
-        Args:
-            simulator: A key of `simulators`.
-            commands: As `draw_commands` returns them.
-            faults: The faults; None for nominal.
-            values: Values of `parameters`; None: those of the simulator.
+        """Runs a coarse simulator, see `Aircraft.run_coarse`; `values` are those of `parameters`, None those of the simulator.
 
         Returns:
             For each fault, float32 array of shape `(samples, 4)`: the channels and the load, without the first orbit.
@@ -96,22 +83,13 @@ class Battery:
 
     def _run(self, model: Model, commands: np.ndarray, faults: Sequence[Fault | None]) -> list[np.ndarray]:
         found = simulate_all(commands[:, 0], REGIMES["gentle"], faults, [model])
-        return [runs[0].values[ORBIT_SAMPLES:] for runs in found]
+        return [runs[0][ORBIT_SAMPLES:] for runs in found]
 
     def can_simulate(self, simulator: str, kind: str) -> bool:
         """Whether a coarse simulator can express a kind of fault: heat transfer means nothing without a temperature."""
         return not (self.simulators[simulator].is_isothermal and kind == "poor heat transfer")
 
     def measure(self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
-        """Measures channels with noisy sensors.
-
-        Args:
-            values: Simulated channels, shape `(samples, 3)`.
-            rng: Random number generator.
-            scale: Factor of the noise.
-
-        Returns:
-            Telemetry, float32 of the same shape.
-        """
+        """Measures simulated channels of shape `(samples, 3)` with sensors whose noise is multiplied by `scale`; returns float32."""
         noise, step = (SENSOR_NOISE_V, SENSOR_NOISE_A, SENSOR_NOISE_C), (SENSOR_STEP_V, SENSOR_STEP_A, SENSOR_STEP_C)
         return np.stack([measure(values[:, each], scale * noise[each], step[each], rng) for each in range(3)], axis=1)

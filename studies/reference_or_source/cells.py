@@ -107,14 +107,7 @@ def rows_of(
 
 
 def judged(system: Any, windows: Judged, scores: Scores, limit: Callable[[np.ndarray], float], by_severity: bool) -> list[dict[str, Any]]:
-    """Counts alarms at the threshold of the known windows.
-
-    Args:
-        system: The system.
-        windows: The windows.
-        scores: The scores of one detector in one use.
-        limit: The function that sets the threshold.
-        by_severity: Whether each severity has a row.
+    """Counts alarms of one detector in one use at the threshold that `limit` sets on the known windows.
 
     Returns:
         A row for nominal windows, with `events`: the number of times a day that alarms begin; and one for each fault or kind of fault, whose
@@ -126,13 +119,10 @@ def judged(system: Any, windows: Judged, scores: Scores, limit: Callable[[np.nda
     begins = int(nominal[0]) + int(np.sum(nominal[1:] & ~nominal[:-1]))
     about = {"use": scores.use, "detector": scores.detector}
     rows = [about | {"kind": NOMINAL, "severity": 0.0, "alarms": float(nominal.mean()), "events": begins / days}]
-    shares = [float(alarms[windows.labels == number].mean()) for number in range(len(windows.faults))]
-    if by_severity:
-        found = {fault: [share] for fault, share in zip(windows.faults, shares, strict=True)}
-    else:
-        found = {(kind, 0.0): [] for kind, _ in windows.faults}
-        for (kind, _), share in zip(windows.faults, shares, strict=True):
-            found[kind, 0.0].append(share)
+    found: dict[tuple[str, float], list[float]] = {}
+    for number, (kind, severity) in enumerate(windows.faults):
+        share = float(alarms[windows.labels == number].mean())
+        found.setdefault((kind, severity if by_severity else 0.0), []).append(share)
     return rows + [
         about | {"kind": kind, "severity": severity, "alarms": float(np.mean(each)), "events": np.nan}
         for (kind, severity), each in found.items()

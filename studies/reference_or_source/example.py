@@ -8,13 +8,11 @@ The files need no JSBSim to be read. Times count seconds; nominal flights of 20 
     simulator_planned.csv  the point mass over that flight as planned: an operator does not know of the fault
 """
 
-import functools
 import sys
-from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from enhsim_tf.common.atomic_files import make_folder, replace_file
 from studies.common.command import example_command
 from studies.reference_or_source.aircraft import Aircraft
 from studies.reference_or_source.aircraft_faults import Fault
@@ -28,20 +26,20 @@ _TELEMETRY_DIGITS = (2, 0, 2, 1, 1, 0)
 _SIMULATOR_DIGITS = (2, 0, 2, 1, 1, 0, 0, 0)
 
 
-def write_example(folder: Path, seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> None:
-    """Simulates the flights and writes the four files.
+def tables(seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> dict[str, pd.DataFrame]:
+    """Simulates the flights.
 
     Args:
-        folder: The output folder, which is created.
         seed: Seed of the commands, of the turbulence and of the sensors.
         num_flights: Number of nominal flights; one flight with the fault follows.
 
-    Raises:
-        InputError: If JSBSim is not installed or the folder cannot be written to.
-    """
-    import pandas as pd
+    Returns:
+        The four tables by name.
 
-    folder, aircraft = make_folder(folder), Aircraft()
+    Raises:
+        InputError: If JSBSim is not installed.
+    """
+    aircraft, found = Aircraft(), {}
     for part, (number, fault) in enumerate(((num_flights, None), (1, FAULT))):
         rng = np.random.default_rng([seed, part])
         commands = aircraft.draw_commands(number, rng)
@@ -54,15 +52,10 @@ def write_example(folder: Path, seed: int = SEED, num_flights: int = NUM_FLIGHTS
             ("simulator" if fault is None else "simulator_planned", aircraft.coarse_columns, _SIMULATOR_DIGITS, simulator),
         ):
             cells = zip(columns, digits, values.T, strict=True)
-            table = pd.DataFrame(
-                {column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)] for column, places, series in cells}
-            )
-            table.insert(0, "time", times)
-            with replace_file(folder / f"{name}.csv") as temporary:
-                table.to_csv(temporary, index=False, lineterminator="\n")
+            table = {column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)] for column, places, series in cells}
+            found[name] = pd.DataFrame({"time": times} | table)
+    return found
 
-
-main = functools.partial(example_command, "reference_or_source", "aircraft", write_example)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(example_command("reference_or_source", "aircraft", tables))

@@ -22,7 +22,7 @@ def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, prog
     """Simulates all runs of a seed and writes them to `runs.npz`.
 
     Args:
-        system: A system, see `run.make_system`.
+        system: A system, `aircraft.Aircraft` or `battery.Battery`.
         counts: Number of units of `fit`, `test`, `source`, of the telemetry that parameters are fitted to (`parameters`), and of a run
             under each fault (`fault`).
         seed: Seed of the commands.
@@ -71,13 +71,8 @@ def key_of(fault: Any) -> str:
 def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> np.ndarray:
     """Fits the parameters of the simulator with wrong physics by least squares, as an engineer without networks would.
 
-    Args:
-        system: The system.
-        commands: Commands of the telemetry.
-        telemetry: Telemetry, shape `(samples, channels)`.
-
     Returns:
-        The values of `system.parameters`.
+        The values of `system.parameters` that lead from the commands to telemetry of shape `(samples, channels)`.
     """
     scale, number = telemetry.std(axis=0), telemetry.shape[1]
 

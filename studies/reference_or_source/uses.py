@@ -124,16 +124,7 @@ class Cell:
         return self._less(tested.telemetry, tested.coarse, self.enhance)
 
     def noise(self, number: int, stream: int, rows: np.ndarray | None = None) -> np.ndarray:
-        """Draws residual windows.
-
-        Args:
-            number: Number of windows.
-            stream: Number of the stream of random draws.
-            rows: The known windows whose residuals are drawn; None: all.
-
-        Returns:
-            Noise of shape `(number, samples, channels)`.
-        """
+        """Draws residual windows of some known windows (None: all) in one of several random streams; `(number, samples, channels)`."""
         rng, residuals = np.random.default_rng([self.seed, 200, stream]), self.residuals if rows is None else self.residuals[rows]
         channels = residuals.shape[2]
         if self.draws == "separate":
@@ -142,11 +133,7 @@ class Cell:
         return drawn * np.exp(rng.uniform(-np.log(2), np.log(2), (number, 1, channels))) if self.draws == "randomised" else drawn
 
     def scores(self, uses: tuple[str, ...] = USES) -> Iterator[Scores]:
-        """Scores of every detector in every use.
-
-        Args:
-            uses: The uses that are tried.
-        """
+        """Scores of every detector in every use that is tried."""
         known, tested = self.windows.known, self.windows.tested
         alone: dict[str, dict[str, Scores]] = {}
         signals: dict[str, Callable[[], tuple[np.ndarray, np.ndarray]]] = {
@@ -176,13 +163,9 @@ class Cell:
             yield from self.classified(tuple(self.windows.simulated), uses)
 
     def classified(self, faults: Sequence[int], uses: tuple[str, ...] = USES) -> Iterator[Scores]:
-        """Scores of classifiers that learn some simulated faults.
+        """Scores of classifiers that learn the simulated faults of these numbers.
 
         Known windows are scored by classifiers whose enhancer and noise come from other folds.
-
-        Args:
-            faults: Numbers of the faults.
-            uses: The uses that are tried.
         """
         known, tested = self.windows.known, self.windows.tested
         some = [tuple(_spread(each) for each in self.windows.simulated[number]) for number in faults]

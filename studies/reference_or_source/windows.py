@@ -38,14 +38,7 @@ class Windows:
 
 
 def unit_starts(system: Any, num_units: int, stride: int, first: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """First samples and units of windows that lie within one unit each.
-
-    Args:
-        system: The system.
-        num_units: Number of units of the run.
-        stride: Samples between two windows.
-        first: First sample of a unit that a window may begin with.
-    """
+    """First samples and units of windows, a stride apart, that lie within one unit each, behind its `first` sample."""
     inside = np.arange(first, system.unit_samples - system.window + 1, stride)
     starts = (np.arange(num_units)[:, None] * system.unit_samples + inside).ravel()
     return starts, starts // system.unit_samples
@@ -69,12 +62,9 @@ def by_fold(folds: np.ndarray, predict: Callable[[np.ndarray, np.ndarray], np.nd
 
 
 def delayed(coarse: np.ndarray, unit_samples: int, delays: np.ndarray) -> np.ndarray:
-    """Delays each unit of a coarse run; its first value is repeated where nothing is known.
+    """Delays each unit of a coarse run of shape `(samples, columns)` by so many samples, negative for a run that is early.
 
-    Args:
-        coarse: The run, shape `(samples, columns)`.
-        unit_samples: Samples of a unit.
-        delays: Delay of each unit in samples, negative for a run that is early.
+    The first value of a unit is repeated where nothing is known.
     """
     units = coarse.reshape(-1, unit_samples, coarse.shape[1])
     places = np.clip(np.arange(unit_samples) - delays[:, None], 0, unit_samples - 1)

@@ -15,7 +15,6 @@ from studies.common import evaluation
 from studies.common.controls import CONTROLS
 from studies.common.example import Example
 from studies.common.settings import Settings
-from studies.robustness import real_floor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,17 +66,12 @@ class Replicate:
         training, held_out = self.arms("arms, training"), self.arms("arms, threshold")
         rows: dict[str, list[dict]] = {name: [] for name in TABLES}
         told = self.stages.progress.loop("arm", len(ARMS))
-        for number, arm in enumerate(ARMS):
+        for done, arm in enumerate(ARMS, 1):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
-
-            def on_detector(done: float, before: int = number, of: int = len(detectors)) -> None:
-                told(before + done / of)
-
-            judged = evaluation.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
+            judged = evaluation.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed)
             for name in TABLES:
                 rows[name] += [{"arm": arm, **row} for row in judged[name]]
-            rates = evaluation.false_alarm_rates(judged["alarms"]).values()
-            self.stages.tell(f"  {arm:28} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
+            told(done)
         for name, each in rows.items():
             table = pd.DataFrame(each, columns=TABLES[name])
             table.assign(environment=self.settings.noise, seed=seed).to_parquet(folder / f"{name}.parquet")
@@ -98,14 +92,6 @@ class Replicate:
             chosen.num_anomalous if num_anomalous is None else num_anomalous,
             rate=chosen.false_alarm_rate,
         )
-
-    def floor(self) -> tuple[real_floor.RealFloor, np.ndarray]:
-        """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample, for measures of realism."""
-        every = (self.example.windows(part, None) for part in ("test", "train", "calibration"))
-        real, again, held_out = (windows["target"] - windows["truth"] for windows in every)
-        number = min(self.settings.robustness.num_windows, len(real), len(again), len(held_out))
-        floor = real_floor.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
-        return floor, held_out[:number]
 
     def arms(self, purpose: str) -> dict[str, np.ndarray]:
         """Windows of every arm.

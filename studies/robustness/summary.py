@@ -27,7 +27,6 @@ KEPT = KeptTables(
     ("alarms", "recall", "degraded"),
     labels=("environment", "arm", "detector", "kind", "method", "mode"),
     digits=4,
-    kind="study",
     command="python -m studies.robustness",
     digits_of={"recall": 3},  # shares of 150 windows, in the largest table
 )
@@ -112,14 +111,10 @@ def _share(found: Mapping[str, float]) -> dict[str, float]:
 
 
 def keeps_the_rule(rate: "pd.Series", recall: "pd.Series") -> "pd.DataFrame":
-    """Whether each row meets the criterion of claim C8; one column per arm.
+    """Whether each row of rates and recalls, indexed by `arm` and more, meets the criterion of claim C8; one column per arm.
 
     The false-alarm rate has to be at most twice that of training on real telemetry plus one percentage point, and recall at most
     five points lower.
-
-    Args:
-        rate: False-alarm rates, indexed by `arm` and more.
-        recall: Recall, indexed likewise.
     """
     rates, recalls = rate.unstack("arm"), recall.unstack("arm")
     return rates.le(2 * rates["real"] + 0.01, axis=0) & recalls.ge(recalls["real"] - 0.05, axis=0)

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.detectors import ResidualSize
 from enhsim_tf.detection.registry import RESIDUAL
 from enhsim_tf.telemetry.windows import cut_windows
@@ -70,13 +69,7 @@ def left_discord(series: np.ndarray, begins: np.ndarray, window: int) -> np.ndar
         For each window, the Euclidean distance to its nearest neighbour, float64 of shape `(windows,)`. It is the largest possible
         distance, `2 * sqrt(window)`, if there is none. The distance between a constant window and one that is not constant is
         `sqrt(window)`, and between two constant ones 0.
-
-    Raises:
-        InputError: If a window leaves the series.
     """
-    begins = np.asarray(begins)
-    if not len(begins) or begins.min() < 0 or begins.max() + window > len(series):
-        raise InputError(f"Expected windows inside the series of {len(series)} samples. Received: windows of {window} samples beyond it.")
     every = np.lib.stride_tricks.sliding_window_view(np.asarray(series, np.float64), window)
     mean, spread = every.mean(axis=1), every.std(axis=1)
     is_flat = spread <= _FLAT * spread.max(initial=0.0)

@@ -19,7 +19,6 @@ KEPT = KeptTables(
     ("channels", "enhancement", "detectors"),
     labels=("training", "detector", "channel", "method"),
     digits=5,
-    kind="study",
     command="python -m studies.spacecraft --data FOLDER",
 )
 

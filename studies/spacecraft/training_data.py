@@ -11,7 +11,6 @@ from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.simulator.simulator import check_finite
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, random_window_starts
-from studies.common.block_bootstrap import BlockBootstrap
 from studies.common.controls import CONTROLS
 from studies.common.evaluation import cross_fitted_scores
 from studies.common.settings import Settings
@@ -45,7 +44,7 @@ def generators(
     residuals = (windows - simulator.enhance(*simulator.alignment.align(windows)))[:, :, 0]
     noises = {
         "GAN": _fit_paper_gan(residuals, chosen.num_iterations, settings.seed, progress),
-        "bootstrap": BlockBootstrap.fit(residuals, min(chosen.block, window)),
+        "bootstrap": BlockBootstrap(residuals, min(chosen.block, window)),
     }
 
     def enhanced(noise: Any, seed: int) -> np.ndarray:
@@ -58,11 +57,36 @@ def generators(
 
 def _fit_paper_gan(residuals: np.ndarray, num_iterations: int, seed: int, progress: Progress) -> Any:
     from enhsim_tf.paper.settings import make_settings
-    from studies.common.paper_gan import fit_paper_gan
+    from studies.common.paper_gan import PaperGAN
 
     told = progress.loop("noise GAN, iteration", num_iterations)
     chosen = make_settings(seed=seed, window=residuals.shape[1], iterations=num_iterations, record_every=min(100, num_iterations))
-    return fit_paper_gan(residuals, chosen, 10 * float(np.std(residuals, dtype=np.float64)), told)
+    return PaperGAN(residuals, chosen, 10 * float(np.std(residuals, dtype=np.float64)), told)
+
+
+class BlockBootstrap:
+    """Block bootstrap (Künsch 1989): randomly drawn blocks of the real noise, concatenated; a non-parametric upper baseline.
+
+    The noise is real within a block, and independent across the boundary of two blocks. The boundaries have random
+    positions in a window, so that all samples have the same distribution.
+
+    Args:
+        windows: Noise windows of shape `(windows, samples)`.
+        block: Number of samples in a block, at most those of a window.
+    """
+
+    def __init__(self, windows: np.ndarray, block: int):
+        self.windows, self.block = np.asarray(windows, np.float32), block
+
+    def generate(self, number: int, rng: np.random.Generator) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples)`."""
+        samples = self.windows.shape[1]
+        chain = (number, -(-samples // self.block) + 1)
+        sources = rng.integers(0, len(self.windows), chain)
+        begins = rng.integers(0, samples - self.block + 1, chain)
+        places = np.arange(samples) + rng.integers(0, self.block, (number, 1))  # a window starts at a random position of its first block
+        rows, blocks = np.arange(number)[:, None], places // self.block
+        return self.windows[sources[rows, blocks], begins[rows, blocks] + places % self.block]
 
 
 def source_rows(

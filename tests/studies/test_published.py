@@ -6,9 +6,9 @@ import json
 import pytest
 
 from studies.common.command import PUBLISHED
-from studies.common.figures import save_all
+from studies.common.replicates import save_all
 
-STUDIES = ("battery", "few_windows", "noise_models", "spacecraft")
+STUDIES = ("battery", "factorial", "few_windows", "noise_models", "robustness", "spacecraft")
 
 
 def findings(study):
@@ -27,29 +27,66 @@ def test_the_published_findings_are_those_of_the_published_tables(study, near):
     assert again == near(shared(kept, again)) and kept["budget"] == "full"
 
 
-@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize("study", [*STUDIES, "reference_or_source"])
 def test_the_figures_are_drawn_from_the_findings(study, tmp_path):
     figures = importlib.import_module(f"studies.{study}.figure").FIGURES
     paths = save_all(figures, findings(study), tmp_path, f"python -m studies.{study}")
     assert {path.name for path in paths} == {f"{name}.{kind}" for name in figures for kind in ("png", "svg")}
 
 
-def test_the_page_of_the_battery_has_the_numbers_of_the_findings(numbers_of):
-    rows, regimes = numbers_of("battery"), findings("battery")["regimes"]
-    shown = [use for use in regimes["gentle"]["uses"] if use in rows]
-    assert len(shown) == 8
-    for use in shown:
-        about = [regimes[regime]["uses"][use] for regime in ("gentle", "hard")]
-        values = [value for each in about for value in (*each["recall"].values(), each["false_alarms"]["mean"])]
-        assert rows[use] == pytest.approx([100 * value for value in values], abs=0.051), use
+def of_battery(found):
+    for use in found["regimes"]["gentle"]["uses"]:
+        about = [found["regimes"][regime]["uses"][use] for regime in ("gentle", "hard")]
+        yield use, [100 * value for each in about for value in (*each["recall"].values(), each["false_alarms"]["mean"])]
 
 
-def test_the_page_of_the_spacecraft_has_the_numbers_of_the_findings(numbers_of):
-    rows, found = numbers_of("spacecraft"), findings("spacecraft")
-    results = found["references"] | found["controls"] | found["sources"]
-    shown = [name for name in results if name in rows]
-    assert len(shown) == 11
-    for name in shown:
-        about = results[name]
-        values = [about["auc_pr"]["mean"], 100 * about["false_alarms"]["mean"], 100 * about["found"]["0.01"]]
-        assert rows[name][:1] == pytest.approx(values[:1], abs=0.0051) and rows[name][1:] == pytest.approx(values[1:], abs=0.51), name
+def of_factorial(found):
+    for name, about in found["cells"].items():
+        yield name, [100 * value for value in (*about["false_alarms"].values(), about["recall_at_real_rate"], about["gap_closed"])]
+    for environment, about in found["contrasts"]["no network, real"]["by_environment"].items():
+        yield environment, [100 * value for value in about["false_alarms"].values()]
+
+
+def of_robustness(found):
+    for arm, about in found["arms"].items():
+        values = (*about["false_alarms"].values(), about["recall_at_real_rate"])
+        yield arm, [*(100 * value for value in values), *about["criterion"].values()]
+
+
+def of_spacecraft(found):
+    for name, about in (found["references"] | found["controls"] | found["sources"]).items():
+        yield name, [about["auc_pr"]["mean"], 100 * about["false_alarms"]["mean"], 100 * about["found"]["0.01"]]
+
+
+def of_reference_or_source(found):
+    shown = {"reference, enhanced run": "reference", "source, detectors of nominal windows": "source", "no simulator": "no simulator"}
+    for name, use in shown.items():
+        values = []
+        for about in found["systems"].values():
+            middle = next(each["units"] for each in about["points"] if each["axis"] != "main")
+            of_main = {
+                each["units"]: each["uses"].get(use)
+                for each in about["points"]
+                if (each["axis"], each["simulator"]) == ("main", "wrong physics")
+            }
+            values += [100 * value for value in (*of_main[middle]["recall"].values(), of_main[middle]["false_alarms"]["mean"])]
+        yield name, values
+
+
+@pytest.mark.parametrize(
+    ("study", "values", "number", "within"),
+    [
+        ("battery", of_battery, 8, [0.051] * 8),
+        ("factorial", of_factorial, 14, [0.051] * 4 + [0.51]),
+        ("reference_or_source", of_reference_or_source, 3, [0.051, 0.51, 0.51, 0.051] * 2),
+        ("robustness", of_robustness, 6, [0.051] * 6),
+        ("spacecraft", of_spacecraft, 11, [0.0051, 0.051, 0.51]),
+    ],
+)
+def test_the_tables_of_a_page_have_the_numbers_of_the_findings(study, values, number, within, numbers_of):
+    rows = numbers_of(study)
+    shown = {name: expected for name, expected in values(findings(study)) if name in rows}
+    assert len(shown) == number
+    for name, expected in shown.items():
+        assert len(rows[name]) == len(expected)
+        assert all(abs(told - true) <= most for told, true, most in zip(rows[name], expected, within, strict=False)), name

@@ -1,4 +1,4 @@
-"""A convolutional GAN of noise, which the studies on robustness and on factors compare with simpler noise models.
+"""A convolutional GAN of noise, which the factorial study compares with simpler noise models.
 
 The generator convolves white noise, so that every sample has a random input of its own. A path that processes one sample at a time
 produces rare large values. Slow latent channels with an exponential gain produce changes over many windows, for example of the scale.

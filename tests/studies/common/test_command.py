@@ -4,7 +4,7 @@ import importlib
 
 import pytest
 
-STUDIES = ("robustness", "factorial", "noise_models", "few_windows", "spacecraft", "battery")
+STUDIES = ("robustness", "factorial", "noise_models", "few_windows", "spacecraft", "battery", "reference_or_source")
 
 
 @pytest.mark.parametrize("study", STUDIES)

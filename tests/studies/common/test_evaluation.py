@@ -1,14 +1,11 @@
 """The evaluation of arms: the counted quantities, and the same real telemetry for all arms."""
 
 import numpy as np
-import pytest
 
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
-from enhsim_tf.detection.detectors import LargestStep, PCAResidual
-from enhsim_tf.telemetry.windows import mean_over_windows
-from studies.common import evaluation
-from studies.common.evaluation import cross_fitted_scores, evaluate_arm, false_alarm_rates, make_trial
+from enhsim_tf.detection.detectors import PCAResidual
+from studies.common.evaluation import cross_fitted_scores, evaluate_arm, make_trial
 
 WINDOW = 300
 
@@ -25,6 +22,10 @@ class Largest:
 
 def noise(num_windows, seed, sd=1.0):
     return np.random.default_rng(seed).normal(0, sd, (num_windows, WINDOW)).astype(np.float32)
+
+
+def false_alarm_rate(found):
+    return sum(row["alarms"] for row in found["alarms"]) / sum(row["windows"] for row in found["alarms"])
 
 
 def trial(seed=0, num_windows=120, **settings):
@@ -47,20 +48,14 @@ def test_every_kind_and_severity_is_there_at_the_same_places():
     assert (changed["level_shift", 1.0] | ~changed["oscillation", 1.0]).all()
 
 
-def test_same_seed_same_trial_and_another_differs():
-    for first, second, same in ((trial(3), trial(3), True), (trial(3), trial(4), False)):
-        assert np.array_equal(first.anomalous["ramp", 2.0], second.anomalous["ramp", 2.0]) is same
-
-
 def test_rates_worked_by_hand():
     made = trial(rate=0.1)
     held_out = noise(99, 5)
-    found = evaluate_arm(noise(50, 4), held_out, made, {"largest": lambda seed: Largest()}, seed=0, num_blocks=4)
+    found = evaluate_arm(noise(50, 4), held_out, made, {"largest": lambda seed: Largest()}, seed=0)
     threshold = np.sort(held_out.max(axis=1))[89]  # rank ceil(100 * 0.9) of 99
     alarms = made.nominal.max(axis=1) > threshold
-    assert [row["alarms"] for row in found["alarms"]] == [int(block.sum()) for block in np.split(alarms, 4)]
-    assert [row["windows"] for row in found["alarms"]] == [30] * 4
-    assert false_alarm_rates(found["alarms"]) == {"largest": pytest.approx(alarms.mean())}
+    assert [row["alarms"] for row in found["alarms"]] == [int(block.sum()) for block in np.split(alarms, 10)]
+    assert [row["windows"] for row in found["alarms"]] == [12] * 10
     (row,) = [row for row in found["recall"] if (row["kind"], row["severity"]) == ("level_shift", 4.0)]
     scores = made.anomalous["level_shift", 4.0].max(axis=1)
     assert row["recall"] == np.mean(scores > threshold)
@@ -68,23 +63,12 @@ def test_rates_worked_by_hand():
     assert len(found["recall"]) == len(INJECTIONS) * len(SEVERITIES)
 
 
-def test_exchangeable_arms_alarm_at_the_rate_they_were_set_for():
-    # 40 draws of 500 windows: the mean of the rates has a standard error below sqrt(0.05 * 0.95 / 500 * 2 / 40) = 0.0022
-    rates = []
-    for seed in range(40):
-        nominal = noise(500, [seed, 1])
-        real = evaluation.Trial(nominal, nominal, {("ramp", 1.0): nominal[:5]}, rate=0.05)
-        found = evaluate_arm(noise(5, [seed, 2]), noise(500, [seed, 3]), real, {"step": lambda seed: LargestStep()}, seed=0)
-        rates.append(false_alarm_rates(found["alarms"])["step"])
-    assert abs(np.mean(rates) - 0.05) < 0.008
-
-
 def test_too_clean_an_arm_alarms_on_everything_and_too_noisy_a_one_on_nothing():
     made = trial()
     rates = {}
     for name, sd in (("clean", 0.5), ("right", 1.0), ("noisy", 2.0)):
         found = evaluate_arm(noise(200, 6, sd), noise(200, 7, sd), made, {"PCA": lambda seed: PCAResidual(5, seed=seed)}, seed=0)
-        rates[name] = false_alarm_rates(found["alarms"])["PCA"]
+        rates[name] = false_alarm_rate(found)
         recalls = [row["recall"] for row in found["recall"] if row["kind"] == "variance_change"]
         assert recalls == sorted(recalls)  # grows with the severity
     assert rates["clean"] == 1.0 and rates["right"] < 0.1 and rates["noisy"] == 0.0
@@ -109,8 +93,3 @@ def test_cross_fitted_scores_come_from_detectors_that_saw_no_sample_of_the_windo
     for learnt, held_out in zip(fitted, np.array_split(np.arange(len(starts)), 5), strict=True):
         assert not set(learnt.ravel()) & set(windows[held_out].ravel())
         np.testing.assert_allclose(scores[held_out], np.abs(windows[held_out] - learnt.mean(axis=0)).max(axis=1))
-
-
-def test_samples_behind_the_last_window_take_its_score():
-    scores = mean_over_windows(np.array([1.0, 3.0, 8.0]), np.array([0, 2, 4]), 4, 10)
-    assert scores.tolist() == [1, 1, 2, 2, 5.5, 5.5, 8, 8, 8, 8]

@@ -1,28 +1,16 @@
-"""Gaps, the volume under a surface and the recall at the real rate, compared with small cases by hand, closed forms and a direct implementation of VUS-PR."""
+"""The volume under a surface and the recall at the real rate, compared with small cases by hand, closed forms and a direct implementation of VUS-PR."""
 
 import math
 
 import numpy as np
 import pytest
-from sklearn.metrics import average_precision_score
 
-from studies.common.metrics import gap_closed, recall_at_real_rate, vus_pr
+from studies.common.metrics import recall_at_real_rate, vus_pr
 
 
 def test_recall_at_the_real_rate_by_hand():
     assert recall_at_real_rate(np.arange(99), [97.5, 98, 98.5, 200], rate=0.01) == 0.5  # the threshold is 98
-    assert recall_at_real_rate(np.arange(99), [97, 98.5], rate=0.02) == 0.5  # the threshold is 97
     assert recall_at_real_rate(np.arange(199), [197.5, 196.5]) == 0.5  # by default 1 %: the threshold is 197
-
-
-def test_gap_closed():
-    assert gap_closed(0.26, 1, 0.01) == pytest.approx(0.74 / 0.99)
-    assert (gap_closed(1, 1, 0.01), gap_closed(0.01, 1, 0.01)) == (0, 1)
-    assert gap_closed(0, 1, 0.01) > 1
-    assert math.isnan(gap_closed(0.3, 0.01, 0.01))
-
-
-# -- the volume under the surface --------------------------------------------------------------------------------------
 
 
 def ranges_of(labels):
@@ -75,21 +63,7 @@ def test_volume_of_one_range_by_hand():
     assert vus_pr(labels, scores, 2) == pytest.approx((0.75 + 0.75 + buffered) / 3)
 
 
-def test_existence_is_rewarded_by_hand():
-    # the first alarm finds half of the samples and one of two ranges: recall 1/4
-    assert vus_pr([1, 0, 1, 0], [4, 3, 2, 1], 0) == 1 / 4 * 1 + 3 / 4 * 2 / 3
-    # one range of as many samples: no reward is missing
-    assert vus_pr([1, 1, 0, 0], [4, 2, 3, 1], 0) == 1 / 2 * 1 + 1 / 2 * 2 / 3
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_without_a_buffer_one_range_has_the_average_precision(seed):
-    rng = np.random.default_rng(seed)
-    labels, scores = labels_of(500, (100, 160)), rng.integers(0, 40, 500) + 5 * labels_of(500, (90, 150))
-    assert vus_pr(labels, scores, 0) == pytest.approx(average_precision_score(labels, scores), abs=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
     "ranges",
     [[(20, 30)], [(0, 4), (56, 60)], [(10, 12), (14, 20), (40, 41)], [(0, 60)], [(5, 6), (30, 31)]],
@@ -102,36 +76,15 @@ def test_volume_is_that_of_the_definition(ranges, seed):
         assert vus_pr(labels, scores, max_buffer) == pytest.approx(volume_by_the_definition(labels, scores.tolist(), max_buffer), abs=1e-12)
 
 
-def test_a_grid_of_buffers_is_the_mean_of_theirs():
-    rng, labels = np.random.default_rng(0), labels_of(400, (50, 90), (200, 230))
-    scores = rng.random(400) + 0.3 * labels
-
-    def area(length):  # volumes are means of areas, so that areas are differences of sums
-        return (length + 1) * vus_pr(labels, scores, length) - (length * vus_pr(labels, scores, length - 1) if length else 0)
-
-    assert vus_pr(labels, scores, 40, num_buffers=5) == pytest.approx(np.mean([area(length) for length in (0, 10, 20, 30, 40)]))
-    assert vus_pr(labels, scores, 40, num_buffers=41) == pytest.approx(vus_pr(labels, scores, 40))
-    assert vus_pr(labels, scores, 40, num_buffers=5) == pytest.approx(vus_pr(labels, scores, 40), rel=0.01)
-
-
 TRACE = labels_of(10_000, (2_450, 2_550), (7_450, 7_550))  # 2 % in two ranges of 100 samples
 
 
-def test_random_score_reaches_the_mean_soft_label():
+def test_a_random_score_reaches_the_mean_soft_label_and_the_labels_themselves_1():
     rng = np.random.default_rng(0)
-    volume = np.mean([vus_pr(TRACE, rng.random(10_000), 100, num_buffers=11) for _ in range(20)])
-    lengths = np.linspace(0, 100, 11)
-    soft = [200 + 4 * sum(math.sqrt(1 - d / length) for d in range(1, int(length) // 2 + 1)) for length in lengths]
-    assert volume == pytest.approx(np.mean(soft) / 10_000, rel=0.1)
-    assert vus_pr(TRACE, np.ones(10_000), 100, 11) == pytest.approx(np.mean(soft) / 10_000)  # flags all or none
-
-
-def test_oracle_reaches_1():
-    rng = np.random.default_rng(0)
+    soft = [200 + 4 * sum(math.sqrt(1 - d / length) for d in range(1, length // 2 + 1)) for length in range(101)]
+    assert np.mean([vus_pr(TRACE, rng.random(10_000), 100) for _ in range(10)]) == pytest.approx(np.mean(soft) / 10_000, rel=0.1)
+    assert vus_pr(TRACE, np.ones(10_000), 100) == pytest.approx(np.mean(soft) / 10_000)  # flags all or none
     assert vus_pr(TRACE, TRACE, 100) == 1
-    assert vus_pr(TRACE, TRACE + 0.01 * rng.random(10_000), 100, 11) == pytest.approx(1, abs=1e-3)
-    # The reference figure of an oracle is .976. Over all thresholds, as here, it is 1. A grid of 250 thresholds, as benchmarks use,
-    # steps over the best one and gives .99 (20,000 samples, four ranges of 87, L = 100); .976 itself was not met again.
 
 
 def test_a_late_score_is_forgiven_within_the_buffer():
@@ -141,20 +94,9 @@ def test_a_late_score_is_forgiven_within_the_buffer():
     assert vus_pr(TRACE, np.roll(TRACE, 1_000), 200) < 0.1
 
 
-def test_volume_is_that_of_ranks_alone():
-    scores = np.random.default_rng(0).random(10_000) + 0.2 * TRACE
-    assert vus_pr(TRACE, np.exp(9 * scores) - 4, 50, 3) == vus_pr(TRACE, scores, 50, 3)
-
-
 @pytest.mark.parametrize(
-    ("labels", "scores", "max_buffer", "words"),
-    [
-        ([0, 0], [1, 2], 3, "0 anomalous"),
-        ([0, 1], [1, np.nan], 3, "1 nan"),
-        ([0, 1], [1, 2, 3], 3, "shapes (2,) and (3,)"),
-        ([0, 1], [1, 2], -1, "max_buffer=-1"),
-    ],
+    ("labels", "scores", "words"), [([0, 0], [1, 2], "0 anomalous"), ([0, 1], [1, np.nan], "1 nan"), ([0, 1], [1, 2, 3], "(2,) and (3,)")]
 )
-def test_volumes_that_are_refused(refused, labels, scores, max_buffer, words):
+def test_volumes_that_are_refused(refused, labels, scores, words):
     with refused(words):
-        vus_pr(labels, scores, max_buffer)
+        vus_pr(labels, scores, 3)

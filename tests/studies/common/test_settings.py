@@ -3,14 +3,8 @@
 import numpy as np
 import pytest
 
-from studies.common.environments import FAMILIES, NOISES
 from studies.common.example import draw_noise
-from studies.common.noise_gallery import GALLERY
 from studies.common.settings import make_settings
-
-
-def test_families_of_the_commands_are_those_of_the_gallery():
-    assert set(FAMILIES) == set(GALLERY) and set(NOISES) < set(FAMILIES)
 
 
 @pytest.mark.parametrize("noise", ["shot", "signal_dependent"])
@@ -19,11 +13,6 @@ def test_noise_of_every_process_has_the_standard_deviation_of_the_settings(noise
     signal = 0.5 * np.sin(2 * np.pi * time / 480) + 0.25 * np.sin(2 * np.pi * time / 120)  # of the example telemetry
     drawn = draw_noise(noise, signal, 3.0, np.random.default_rng(0))
     assert np.std(drawn) == pytest.approx(3.0, rel=0.03)
-
-
-def test_an_unknown_process_is_refused(refused):
-    with refused("'pink'"):
-        draw_noise("pink", np.zeros(3), 1.0, np.random.default_rng(0))
 
 
 def test_a_budget_and_changes_reach_their_groups(refused):

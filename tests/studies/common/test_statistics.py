@@ -28,13 +28,6 @@ def test_the_interval_of_crossed_data_has_the_width_that_the_bootstrap_has_in_cl
     assert half_width(interval) == pytest.approx(scipy.stats.norm.ppf(0.975) * np.sqrt(variance), rel=0.04)
 
 
-def test_one_factor_with_one_row_a_label_is_the_plain_bootstrap():
-    values = pd.Series(np.random.default_rng(1).normal(size=30), pd.RangeIndex(30, name="seed"))
-    interval = mean_interval(values, ["seed"], num_resamples=20_000)
-    assert half_width(interval) == pytest.approx(scipy.stats.norm.ppf(0.975) * values.std(ddof=0) / np.sqrt(30), rel=0.04)
-    assert mean_interval(values, ["seed"]) == mean_interval(values, ["seed"])
-
-
 def test_a_factor_whose_labels_all_do_the_same_leaves_the_others_scatter():
     index = pd.MultiIndex.from_product([["white", "shot"], [1, 2]], names=["environment", "seed"])
     values = pd.Series([1.0, 3.0, 1.0, 3.0], index)

@@ -1,5 +1,6 @@
 """The cells have the signal and the noise that their names say, and those of the study of robustness where they agree."""
 
+import argparse
 import json
 
 import numpy as np
@@ -7,19 +8,14 @@ import pytest
 
 from enhsim_tf.common.stages import Stages
 from studies.common.settings import make_settings
+from studies.factorial.__main__ import run
 from studies.factorial.cells import CELLS, DETECTORS, REFERENCES, Cell
 from studies.factorial.pipelines import THRESHOLD, TRAINING, Pipelines
-from studies.factorial.run import run
 from studies.factorial.summary import KEPT
 from studies.robustness.replicate import Replicate
 
-SMALL = {
-    "paper__num_windows": 40,
-    "second__num_windows": 90,
-    "robustness__num_windows": 30,
-    "paper__iterations": 1,
-    "paper__record_every": 1,
-}
+SMALL = {"paper__num_windows": 40, "second__num_windows": 90, "robustness__num_windows": 30}
+SMALL |= {"paper__iterations": 1, "paper__record_every": 1}
 
 
 @pytest.fixture(scope="module")
@@ -45,25 +41,13 @@ def test_the_residual_is_telemetry_minus_the_signal_and_keeps_its_scale(without_
     assert np.std(averaged) == pytest.approx(0.1 * np.sqrt(1 - 1 / 25), rel=0.05)  # what a moving average of 25 samples leaves
 
 
-def test_few_and_many_windows_are_those_of_the_two_pipelines(without_networks):
-    one = without_networks
+def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable(without_networks):
+    one, cell = without_networks, Cell("few", "moving average", "ridge", "autoregression")
     assert [len(one.training_starts(windows)) for windows in ("few", "many")] == [40, 90]
-    paper = one.example.windows("train", 40, "training windows")
-    assert np.array_equal(one.pairs(one.training_starts("few"))[1], paper["target"])
-
-
-def test_ridge_recovers_the_true_signal_from_the_coarse_one(without_networks):
-    windows = without_networks.example.windows("test", None)
-    error = [np.std(without_networks.enhancer("ridge", level)(windows["coarse"]) - windows["truth"]) for level in ("few", "many")]
-    assert error[1] < error[0] < np.std(windows["coarse"] - windows["truth"])
-
-
-def test_training_and_threshold_windows_differ_and_are_repeatable(without_networks):
-    cell = Cell("few", "moving average", "ridge", "autoregression")
-    first, other = (without_networks.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
+    assert np.array_equal(one.pairs(one.training_starts("few"))[1], one.example.windows("train", 40, "training windows")["target"])
+    first, other = (one.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
     assert first.shape == other.shape == (30, 500) and not np.allclose(first, other)
-    again = Pipelines(without_networks.replicate)
-    assert np.array_equal(again.arm(cell, TRAINING), first)
+    assert np.array_equal(Pipelines(one.replicate).arm(cell, TRAINING), first)
 
 
 @pytest.mark.slow
@@ -73,9 +57,10 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
         return [{"detector": name, "alarms": alarms, "windows": 59, "recall": 0.5, "recall_at_real_rate": 0.25} for name in DETECTORS]
 
     monkeypatch.setattr(Pipelines, "judged", judged)
-    found = run(make_settings("smoke", **SMALL), tmp_path / "cache", tmp_path, ["white", "shot"], False, lambda line: None)
+    options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
+    found = run(options, make_settings("smoke", **SMALL), tmp_path)
     table = KEPT.read(tmp_path)["cells"]
-    assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 2 * 34 * len(DETECTORS)
+    assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 34 * len(DETECTORS)
     assert not table.duplicated(["environment", "cell", "detector"]).any()
     assert found["cells"]["coarse"]["false_alarms"]["mean"] == pytest.approx(50 / 59)
     assert json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == found
@@ -90,7 +75,7 @@ def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_co
     coarse = one.arm("coarse", TRAINING)
     for cell, enhance in (
         (Cell("few", "moving average", "network", "paper's GAN"), one.example.enhance),
-        (Cell("many", "residual", "network", "autoregression"), one.second.simulator.enhance),
+        (Cell("many", "residual", "network", "autoregression"), one.second_network),
     ):
         rng = np.random.default_rng(int(one.example.draw(TRAINING).integers(2**31)))
         assert np.array_equal(one.arm(cell, TRAINING), enhance(coarse) + one.generator(cell).generate(len(coarse), rng))

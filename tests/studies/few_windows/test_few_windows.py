@@ -10,7 +10,7 @@ from enhsim_tf.telemetry.series import Telemetry
 from studies.common.settings import make_settings
 from studies.few_windows import summary
 from studies.few_windows.cells import QUICK, World
-from studies.few_windows.record import CORAL, NOISE_MODELS, REAL, SIMULATOR, CoralAlignment, Record
+from studies.few_windows.record import CORAL, NOISE_MODELS, REAL, SIMULATOR, Record, coral_alignment
 
 
 def test_the_simulator_of_a_record_generates_its_signal_and_its_noise():
@@ -30,7 +30,7 @@ def test_aligned_windows_have_the_mean_and_the_covariance_of_the_target():
     rng = np.random.default_rng(0)
     mixing = rng.standard_normal((6, 6))
     source, target = rng.standard_normal((20_000, 6)), rng.standard_normal((20_000, 6)) @ mixing + 3
-    aligned = CoralAlignment.fit(source, target).apply(source)
+    aligned = coral_alignment(source, target)(source)
     np.testing.assert_allclose(aligned.mean(axis=0), target.mean(axis=0), atol=0.05)
     np.testing.assert_allclose(np.cov(aligned.T), np.cov(target.T), atol=0.02 * np.abs(np.cov(target.T)).max())
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common import measures
-from studies.common.noise_processes import AutoregressiveNoise
+from studies.common.noise_processes import autoregressive
 from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
 
 pytestmark = pytest.mark.slow
 
 
 def _noise(number: int, window: int) -> np.ndarray:
-    return AutoregressiveNoise(0.8, 0.3).draw(number * window, np.random.default_rng(9)).reshape(number, window)
+    return autoregressive(number * window, np.random.default_rng(9), coefficient=0.8, sd=0.3).reshape(number, window)
 
 
 def test_a_known_process_is_recovered():

@@ -3,11 +3,12 @@
 import types
 
 import numpy as np
-import pytest
 
 from enhsim_tf.common.stages import Stages
 from studies.common.settings import make_settings
 from studies.robustness.replicate import ARMS, Replicate
+
+ARM = "ridge + residual windows"
 
 
 class Windows:
@@ -31,28 +32,17 @@ class Windows:
         return np.random.default_rng(len(purpose))
 
 
-@pytest.fixture
-def replicate(tmp_path):
-    made = Replicate(make_settings("smoke"), Stages(tmp_path))
-    made.example = Windows()
+def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise_on_windows_that_are_drawn_once(tmp_path):
+    replicate = Replicate(make_settings("smoke"), Stages(tmp_path))
+    replicate.example = Windows()
     ridge = types.SimpleNamespace(predict=lambda coarse: coarse + 2_000.0)
-    made.__dict__["_without_network"] = (ridge, types.SimpleNamespace(generate=lambda number, rng: np.full((number, 10), 20.0)))
-    return made
-
-
-def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise(replicate):
-    arms = replicate.arms("arms, training")
-    assert list(arms) == list(ARMS)
-    coarse = arms["coarse"]
-    assert (arms["truth"] - coarse == 0.25).all()
-    assert (arms["enhanced"] - coarse == 1_000).all()
-    assert arms["enhanced + GAN"] - arms["enhanced"] == pytest.approx(np.random.default_rng(len("arms, training, noise")).random())
-    assert (arms["ridge + residual windows"] - coarse == 2_020).all()
-    assert {len(windows) for windows in arms.values()} == {make_settings("smoke").robustness.num_windows}
-
-
-def test_training_and_threshold_windows_are_drawn_separately(replicate):
-    noises = [arms["enhanced + GAN"] - arms["enhanced"] for arms in map(replicate.arms, ("arms, training", "arms, threshold"))]
+    replicate._without_network = (ridge, types.SimpleNamespace(generate=lambda number, rng: np.full((number, 10), 20.0)))
+    for purpose in ("arms, training", "arms, threshold"):
+        arms = replicate.arms(purpose)
+        assert list(arms) == list(ARMS)
+        assert {len(windows) for windows in arms.values()} == {make_settings("smoke").robustness.num_windows}
+        added = {name: np.unique((windows - arms["coarse"]).round(9)).tolist() for name, windows in arms.items() if name != "real"}
+        noise = round(np.random.default_rng(len(f"{purpose}, noise")).random(), 9)
+        assert added == {"coarse": [0], "truth": [0.25], "enhanced": [1_000], "enhanced + GAN": [1_000 + noise], ARM: [2_020]}
     purposes = replicate.example.purposes
     assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == ["train", "train", "train", "calibration"]
-    assert noises[0][0, 0] != noises[1][0, 0]

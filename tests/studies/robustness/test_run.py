@@ -1,5 +1,6 @@
 """The whole path of the study at smoke budget: one kind of noise, one seed, narrow networks and two detectors."""
 
+import argparse
 import json
 
 import pytest
@@ -8,38 +9,30 @@ from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.detection.registry import DETECTORS
 from studies.common.controls import CONTROLS
 from studies.common.settings import make_settings
-from studies.robustness import replicate, run
+from studies.robustness import replicate
+from studies.robustness.__main__ import run
 from studies.robustness.degraded_modes import METHODS, SEVERITIES
 from studies.robustness.replicate import ARMS
 from studies.robustness.summary import KEPT
 
 pytestmark = pytest.mark.slow
 
-SMALL = {
-    "paper__num_windows": 40,
-    "modes__num_learnt": 90,
-    "robustness__num_windows": 120,
-    "robustness__num_seeds": 1,
-    "paper__iterations": 1,
-    "paper__record_every": 1,
-    "paper__hidden_units": 64,
-}
+SMALL = {"paper__num_windows": 40, "modes__num_learnt": 90, "robustness__num_windows": 120}
+SMALL |= {"robustness__num_seeds": 1, "paper__iterations": 1, "paper__record_every": 1, "paper__hidden_units": 64}
 
 
 @pytest.mark.usefixtures("narrow_networks")
-def test_every_table_has_every_row_and_a_second_run_trains_nothing(tmp_path, monkeypatch):
+def test_every_table_has_every_row_and_a_second_run_trains_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(replicate, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")})
-    out, told = tmp_path / "out", []
-    out.mkdir()
-    arguments = (make_settings("smoke", **SMALL), tmp_path / "cache", out, ["shot"], False)
-    first = run.run(*arguments, told.append)
-    tables = KEPT.read(out)
+    options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
+    first = run(options, make_settings("smoke", **SMALL), tmp_path)
+    tables = KEPT.read(tmp_path)
     detectors = 2 * len(ARMS) + len(CONTROLS)  # controls on real windows only
     assert len(tables["alarms"]) == detectors * 10 and len(tables["recall"]) == detectors * 8 * 5
     assert (tables["alarms"].groupby(["arm", "detector"])["windows"].sum() == 59).all()  # disjoint windows of a quarter of 120,000 samples
     assert len(tables["degraded"]) == len(METHODS) * (1 + len(MODES) * len(SEVERITIES))
-    assert first["budget"] == "smoke" and json.loads((out / "findings.json").read_text(encoding="utf-8")) == first
-    assert 'id="watermark"' in (out / "false_alarms.svg").read_text(encoding="utf-8")
-    told.clear()
-    assert run.run(*arguments, told.append) == first
-    assert not any(line.endswith(" ...") for line in told)
+    assert first["budget"] == "smoke" and json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == first
+    assert 'id="watermark"' in (tmp_path / "false_alarms.svg").read_text(encoding="utf-8")
+    capsys.readouterr()
+    assert run(options, make_settings("smoke", **SMALL), tmp_path) == first
+    assert " ...\n" not in capsys.readouterr().out

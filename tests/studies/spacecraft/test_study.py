@@ -41,38 +41,21 @@ def data(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def results(data, narrow_enhancer, tmp_path_factory):
-    """Tables and findings of a smoke run, with the detectors whose training is quick."""
-    folder = tmp_path_factory.mktemp("out")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training_data, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")})
-        assert command(["--budget", "smoke", "--data", str(data), "--out", str(folder), "--cache", str(folder / "cache")]) == 0
-    return KEPT.read(folder), json.loads((folder / "findings.json").read_text())
-
-
 @pytest.mark.slow
-def test_every_training_data_that_can_be_made_has_a_row_for_every_detector(results):
-    tables, found = results
+@pytest.mark.usefixtures("narrow_enhancer")
+def test_every_training_data_that_can_be_made_has_a_row_for_every_detector(data, tmp_path, monkeypatch):
+    monkeypatch.setattr(training_data, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")})
+    assert command(["--budget", "smoke", "--data", str(data), "--out", str(tmp_path), "--cache", str(tmp_path / "cache")]) == 0
+    tables, found = KEPT.read(tmp_path), json.loads((tmp_path / "findings.json").read_text())
     assert list(found["channels"]) == list(SEQUENCES) and "constant" in found["skipped"]["flat"]
     assert set(found["sources"]) == {"real", "enhanced + GAN", "enhanced + bootstrap", "ridge + residual windows"}
     assert all(set(each["by_detector"]) == {"limit check", "PCA residual"} for each in found["sources"].values())
     assert set(found["references"]) == {name + ending for name in (NETWORK, RIDGE) for ending in BOUNDS}
     assert set(found["controls"]) == set(summary.CONTROLS) and set(tables["enhancement"]["method"]) == {"coarse", "ridge", "enhanced"}
-
-
-@pytest.mark.slow
-def test_a_value_far_outside_is_found_by_the_limit_check_and_by_the_reference(results):
-    _, found = results
-    for each in (found["controls"]["limit check"], found["references"][RIDGE]):
+    for each in (found["controls"]["limit check"], found["references"][RIDGE]):  # a value far outside is found
         assert set(each["found"].values()) == {1.0} and each["auc_pr"]["mean"] > 0.8
-
-
-@pytest.mark.slow
-def test_regression_on_a_wave_that_follows_its_clock_is_as_near_as_the_noise_allows(results):
-    _, found = results
     of_noise = 0.05 / np.sqrt(0.5 * (1 + 0.3**2))
-    for each in found["channels"].values():
+    for each in found["channels"].values():  # regression is as near as the noise allows
         assert of_noise < each["nrmse"]["ridge"] < 2 * of_noise < each["nrmse"]["coarse"] / 2
 
 

@@ -8,10 +8,12 @@ import functools
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.measures import lagged_products
 
 _TINY = 1e-30  # keeps logarithms and quotients of constant windows finite
+_TIME_HALF_BANDWIDTH, _NUM_TAPERS = 4, 7  # samples times half the bandwidth in cycles a sample; Slepian tapers that are averaged
+_NUM_KERNELS = 16  # of each of the dilations 1, 2, 4, ...
+_NUM_NEIGHBOURS = 5  # rank of the neighbour that defines the radius of a neighbourhood
 
 
 def lagged_square_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
@@ -37,16 +39,16 @@ def log_scale_distance(generated_scales: np.ndarray, real_scales: np.ndarray) ->
     return float(wasserstein_distance(generated_scales, real_scales))
 
 
-def excess_kurtosis(windows: np.ndarray) -> float:
-    """Excess kurtosis of the values: the standardised fourth moment minus 3, which is 0 for a Gaussian distribution."""
+def kurtosis_difference(generated: np.ndarray, real: np.ndarray) -> float:
+    """Excess kurtosis of the generated values minus that of the real values. A positive difference means too heavy tails."""
+    return _excess_kurtosis(generated) - _excess_kurtosis(real)
+
+
+def _excess_kurtosis(windows: np.ndarray) -> float:
+    """The standardised fourth moment of the values minus 3, which is 0 for a Gaussian distribution."""
     centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
     squares = centred**2
     return float(np.mean(squares**2) / (np.mean(squares) ** 2 + _TINY) - 3)
-
-
-def kurtosis_difference(generated: np.ndarray, real: np.ndarray) -> float:
-    """Excess kurtosis of the generated values minus that of the real values. A positive difference means too heavy tails."""
-    return excess_kurtosis(generated) - excess_kurtosis(real)
 
 
 def tail_ratio(generated: np.ndarray, real: np.ndarray) -> float:
@@ -54,21 +56,11 @@ def tail_ratio(generated: np.ndarray, real: np.ndarray) -> float:
     return float(np.quantile(np.abs(generated), 0.999) / (np.quantile(np.abs(real), 0.999) + _TINY))
 
 
-def power_spectrum(windows: np.ndarray) -> np.ndarray:
-    """Mean periodogram with a Hann taper, without the zero frequency, shape `(samples // 2,)`, in squared units for each bin."""
-    samples = windows.shape[1]
-    taper = np.hanning(samples + 2)[1:-1]
-    transformed = np.fft.rfft(np.asarray(windows, np.float64) * taper, axis=1)
-    return np.mean(np.abs(transformed[:, 1:]) ** 2, axis=0) / np.sum(taper**2)
-
-
-def window_spectra(windows: np.ndarray, time_half_bandwidth: float = 4, num_tapers: int = 7) -> np.ndarray:
+def window_spectra(windows: np.ndarray) -> np.ndarray:
     """Multitaper power spectrum of each window (Thomson 1982), without the zero frequency and the Nyquist frequency.
 
     Args:
         windows: Windows of shape `(windows, samples)`.
-        time_half_bandwidth: Time half-bandwidth product: the number of samples times half the bandwidth in cycles per sample.
-        num_tapers: Number of Slepian tapers, over which the spectra are averaged.
 
     Returns:
         float64 array of shape `(windows, (samples - 1) // 2)`, in squared units for each bin. The expected spectrum of white
@@ -76,16 +68,16 @@ def window_spectra(windows: np.ndarray, time_half_bandwidth: float = 4, num_tape
     """
     values = np.asarray(windows, np.float64)
     samples, power = values.shape[1], 0.0
-    for taper in _slepian_tapers(samples, time_half_bandwidth, num_tapers):
+    for taper in _slepian_tapers(samples):
         power = power + np.abs(np.fft.rfft(values * taper, axis=1)[:, 1 : (samples + 1) // 2]) ** 2
-    return power / num_tapers
+    return power / _NUM_TAPERS
 
 
 @functools.cache
-def _slepian_tapers(samples: int, time_half_bandwidth: float, num_tapers: int) -> np.ndarray:
+def _slepian_tapers(samples: int) -> np.ndarray:
     from scipy.signal.windows import dpss
 
-    return dpss(samples, time_half_bandwidth, num_tapers)
+    return dpss(samples, _TIME_HALF_BANDWIDTH, _NUM_TAPERS)
 
 
 def geodesic_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
@@ -106,7 +98,7 @@ def _log_ratio(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> np.nd
     return np.log(np.median(generated_spectra, axis=0) + _TINY) - np.log(np.median(real_spectra, axis=0) + _TINY)
 
 
-def convolution_features(windows: np.ndarray, num_kernels: int = 16, seed: int = 0) -> np.ndarray:
+def convolution_features(windows: np.ndarray) -> np.ndarray:
     """Features of each window by fixed random convolutions (ROCKET, Dempster et al. 2020), for a linear classifier.
 
     The kernels have nine taps and all dilations that fit into a window. For each kernel, the features are the largest response
@@ -115,24 +107,16 @@ def convolution_features(windows: np.ndarray, num_kernels: int = 16, seed: int =
 
     Args:
         windows: Windows of shape `(windows, samples)`, standardised by the mean and the standard deviation of real windows.
-        num_kernels: Number of kernels for each of the dilations 1, 2, 4, ...
-        seed: Seed for the kernels and the thresholds.
 
     Returns:
-        float32 array of shape `(windows, dilations * 2 * num_kernels)`.
-
-    Raises:
-        InputError: If the windows are shorter than a kernel.
+        float32 array of shape `(windows, dilations * 2 * _NUM_KERNELS)`.
     """
-    rng, taps = np.random.default_rng(seed), 9
-    values = np.asarray(windows, np.float32)
-    if values.shape[1] < taps:
-        raise InputError(f"Expected windows of at least {taps} samples. Received: {values.shape[1]}.")
+    rng, values, taps = np.random.default_rng(0), np.asarray(windows, np.float32), 9
     found = []
     for dilation in 2 ** np.arange(int(np.log2((values.shape[1] - 1) / (taps - 1))) + 1):
-        kernels = rng.standard_normal((taps, num_kernels)).astype(np.float32)
+        kernels = rng.standard_normal((taps, _NUM_KERNELS)).astype(np.float32)
         kernels /= np.linalg.norm(kernels, axis=0)  # the responses to white noise of standard deviation 1 have standard deviation 1
-        thresholds = rng.standard_normal(num_kernels).astype(np.float32)
+        thresholds = rng.standard_normal(_NUM_KERNELS).astype(np.float32)
         pooled = []
         for begin in range(0, len(values), 64):  # 64 windows fit into the processor's cache
             reach = np.lib.stride_tricks.sliding_window_view(values[begin : begin + 64], (taps - 1) * dilation + 1, axis=1)
@@ -142,42 +126,34 @@ def convolution_features(windows: np.ndarray, num_kernels: int = 16, seed: int =
     return np.concatenate(found, axis=1)
 
 
-def density(generated_features: np.ndarray, real_features: np.ndarray, num_neighbours: int = 5) -> float:
-    """Mean number of real neighbourhoods that contain a generated window, divided by `num_neighbours` (Naeem et al. 2020).
+def density(generated_features: np.ndarray, real_features: np.ndarray) -> float:
+    """Mean number of real neighbourhoods that contain a generated window, divided by the rank of the neighbour (Naeem et al. 2020).
 
-    The neighbourhood of a real window is the ball that extends to its `num_neighbours`-th nearest real window, in features
-    standardised by the real windows. The density of perfect noise is 1. Copies of a few typical windows have a density above 1.
+    The neighbourhood of a real window is the ball that extends to its fifth nearest real window, in features standardised by the
+    real windows. The density of perfect noise is 1. Copies of a few typical windows have a density above 1.
 
     Args:
         generated_features: Features of generated windows, shape `(windows, features)`.
         real_features: Features of real windows, shape `(windows, features)`.
-        num_neighbours: Rank of the neighbour that defines the radius of a neighbourhood.
     """
-    return float(_inside(generated_features, real_features, num_neighbours).sum() / (num_neighbours * len(generated_features)))
+    return float(_inside(generated_features, real_features).sum() / (_NUM_NEIGHBOURS * len(generated_features)))
 
 
-def coverage(generated_features: np.ndarray, real_features: np.ndarray, num_neighbours: int = 5) -> float:
+def coverage(generated_features: np.ndarray, real_features: np.ndarray) -> float:
     """Share of real neighbourhoods (see `density`) that contain at least one generated window (Naeem et al. 2020).
 
-    The expected coverage of perfect noise, with equal numbers of windows, is `1 - 2 ** -num_neighbours`. A generator that
-    repeats itself has a lower coverage.
-
-    Args:
-        generated_features: Features of generated windows, shape `(windows, features)`.
-        real_features: Features of real windows, shape `(windows, features)`.
-        num_neighbours: Rank of the neighbour that defines the radius of a neighbourhood.
+    The expected coverage of perfect noise, with equal numbers of windows, is `1 - 2 ** -5`. A generator that repeats itself has a
+    lower coverage.
     """
-    return float(_inside(generated_features, real_features, num_neighbours).any(axis=0).mean())
+    return float(_inside(generated_features, real_features).any(axis=0).mean())
 
 
-def _inside(generated_features: np.ndarray, real_features: np.ndarray, num_neighbours: int) -> np.ndarray:
-    """Returns whether each generated window lies in each real neighbourhood, shape `(generated, real)`."""
+def _inside(generated_features: np.ndarray, real_features: np.ndarray) -> np.ndarray:
+    """Whether each generated window lies in each real neighbourhood, shape `(generated, real)`."""
     from scipy.spatial.distance import cdist
 
-    if len(real_features) <= num_neighbours:
-        raise InputError(f"Expected more than {num_neighbours} real windows. Received: {len(real_features)}.")
     generated, real = (_standardised(features, real_features) for features in (generated_features, real_features))
-    reach = np.partition(cdist(real, real, "sqeuclidean"), num_neighbours, axis=1)[:, num_neighbours]  # index 0 is the window itself
+    reach = np.partition(cdist(real, real, "sqeuclidean"), _NUM_NEIGHBOURS, axis=1)[:, _NUM_NEIGHBOURS]  # index 0 is the window itself
     return cdist(generated, real, "sqeuclidean") <= reach
 
 
@@ -187,41 +163,16 @@ def mmd_squared(generated_features: np.ndarray, real_features: np.ndarray) -> fl
     The estimate has a mean of 0 for two samples of the same distribution, and can be negative. Features are standardised by
     the real windows. The kernel is exp(-d^2 / (2 m^2)), where m is the median distance between real windows.
     """
-    return float(_mmd(_kernel(generated_features, real_features), len(generated_features), np.arange(len(generated_features))[None])[0])
-
-
-def mmd_p_value(generated_features: np.ndarray, real_features: np.ndarray, num_permutations: int = 500, seed: int = 0) -> float:
-    """Permutation p-value of `mmd_squared`: the share of permutations of all windows whose MMD is at least as large.
-
-    Args:
-        generated_features: Features of generated windows, shape `(windows, features)`.
-        real_features: Features of real windows, shape `(windows, features)`.
-        num_permutations: Number of permutations.
-        seed: Seed for the permutations.
-    """
-    kernel, number, rng = _kernel(generated_features, real_features), len(generated_features), np.random.default_rng(seed)
-    chosen = rng.permuted(np.tile(np.arange(len(kernel)), (num_permutations, 1)), axis=1)[:, :number]
-    found = _mmd(kernel, number, np.concatenate([np.arange(number)[None], chosen]))
-    return float((1 + np.sum(found[1:] >= found[0] - 1e-12)) / (1 + num_permutations))
-
-
-def _kernel(generated_features: np.ndarray, real_features: np.ndarray) -> np.ndarray:
-    """Returns the kernel matrix of all windows, the generated windows first, with zeros on the diagonal."""
     from scipy.spatial.distance import pdist, squareform
 
     generated, real = (_standardised(features, real_features) for features in (generated_features, real_features))
-    bandwidth = max(np.median(pdist(real, "sqeuclidean")), 1e-12)
-    return squareform(np.exp(pdist(np.concatenate([generated, real]), "sqeuclidean") / (-2 * bandwidth)))
-
-
-def _mmd(kernel: np.ndarray, number: int, chosen: np.ndarray) -> np.ndarray:
-    """Returns the unbiased estimate for each row of `chosen`, which holds the indices of the windows treated as generated."""
-    is_generated = np.zeros((len(kernel), len(chosen)))
-    np.put_along_axis(is_generated, chosen.T, 1.0, axis=0)
-    to_generated, other = kernel @ is_generated, len(kernel) - number
-    both, cross = np.sum(is_generated * to_generated, axis=0), np.sum((1 - is_generated) * to_generated, axis=0)
+    bandwidth, number, other = max(np.median(pdist(real, "sqeuclidean")), 1e-12), len(generated), len(real)
+    kernel = squareform(np.exp(pdist(np.concatenate([generated, real]), "sqeuclidean") / (-2 * bandwidth)))  # with zeros on the diagonal
+    is_generated = np.repeat([1.0, 0.0], [number, other])[:, None]
+    to_generated = kernel @ is_generated
+    both, cross = np.sum(is_generated * to_generated), np.sum((1 - is_generated) * to_generated)
     rest = kernel.sum() - both - 2 * cross
-    return both / (number * (number - 1)) + rest / (other * (other - 1)) - 2 * cross / (number * other)
+    return float(both / (number * (number - 1)) + rest / (other * (other - 1)) - 2 * cross / (number * other))
 
 
 def _standardised(features: np.ndarray, reference: np.ndarray) -> np.ndarray:

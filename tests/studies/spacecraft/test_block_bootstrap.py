@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from studies.common.block_bootstrap import BlockBootstrap
+from studies.spacecraft.training_data import BlockBootstrap
 
 
 @pytest.mark.parametrize(("samples", "block"), [(100, 10), (103, 25), (40, 40), (30, 1)])
 def test_every_block_is_found_in_the_source(samples, block):
     source = np.arange(20 * samples, dtype=np.float32).reshape(20, samples)  # a value says its window and its place
-    noise = BlockBootstrap.fit(source, block).generate(50, default_rng(1))
+    noise = BlockBootstrap(source, block).generate(50, default_rng(1))
     assert noise.shape == (50, samples) and noise.dtype == np.float32
     for row in noise.astype(int):
         follows = (np.diff(row) == 1) & (row[1:] // samples == row[:-1] // samples)
@@ -21,14 +21,8 @@ def test_every_block_is_found_in_the_source(samples, block):
 
 def test_bootstrap_keeps_the_marginal():
     source = default_rng(0).standard_t(3, (300, 200))
-    noise = BlockBootstrap.fit(source).generate(2_000, default_rng(2))
+    noise = BlockBootstrap(source, 50).generate(2_000, default_rng(2))
     assert np.isin(noise, source.astype(np.float32)).all()
     shares = [0.25, 0.5, 0.75, 0.95]
     expected = np.quantile(source[:, 50:-50], shares)  # where each sample is in as many blocks as any other
     assert np.quantile(noise, shares) == pytest.approx(expected, abs=0.03)
-
-
-@pytest.mark.parametrize("block", [0, 101])
-def test_blocks_that_are_refused(refused, block):
-    with refused(f"block={block}"):
-        BlockBootstrap.fit(np.ones((3, 100)), block)

@@ -6,27 +6,8 @@ import scipy.linalg
 import scipy.stats
 
 from enhsim_tf.common import measures
-from enhsim_tf.common.two_sample import linear_classifier
-from studies.robustness import distances
+from studies.noise_models import distances
 from tests.common.test_measures import autoregressive, normal
-
-
-@pytest.mark.parametrize("samples", [128, 129])
-def test_power_spectrum_of_white_noise_is_flat(samples):
-    spectrum = distances.power_spectrum(0.5 * normal(2_000, samples))
-    assert spectrum.shape == (samples // 2,)
-    assert spectrum == pytest.approx(np.full(samples // 2, 0.25), rel=5 * np.sqrt(2 / 2_000))
-
-
-def test_power_spectrum_of_a_sine_peaks_at_its_frequency():
-    spectrum = distances.power_spectrum(np.sin(2 * np.pi * 17 / 200 * np.arange(200) + np.array([[0.0], [1.0]])))
-    assert np.argmax(spectrum) + 1 == 17  # the zero frequency is left out
-    assert spectrum[14:19].sum() == pytest.approx(spectrum.sum(), rel=1e-3)
-
-
-def test_lagged_products_of_squares_by_hand():
-    windows, squares = np.array([[1.0, 2, 4], [-1, -2, -4]]), np.array([1.0, 4, 16]) - 7  # their mean is 0
-    assert distances.lagged_square_products(windows + 9, 1)[0] == pytest.approx([np.mean(squares**2), (6 * 3 - 3 * 9) / 2])
 
 
 def test_autocorrelation_distance_is_the_largest_difference():
@@ -49,8 +30,8 @@ def test_log_scales_and_their_distance():
 
 def test_kurtosis_and_tails_of_known_distributions():
     owner, shape, gaussian = np.random.default_rng(0), (400, 500), normal(400, 500)
-    assert distances.excess_kurtosis(np.array([[1.0, -1], [1, -1]]) + 4) == pytest.approx(-2)
-    assert distances.excess_kurtosis(owner.uniform(size=shape)) == pytest.approx(-1.2, abs=0.01)
+    coin = np.array([[1.0, -1], [1, -1]]) + 4  # of excess kurtosis -2, where a uniform law has -1.2 and that of Laplace 3
+    assert distances.kurtosis_difference(owner.uniform(size=shape), coin) == pytest.approx(0.8, abs=0.01)
     laplace = owner.laplace(size=shape)
     assert distances.kurtosis_difference(laplace, owner.uniform(size=shape)) == pytest.approx(4.2, abs=0.3)
     assert distances.tail_ratio(1.5 * gaussian, gaussian) == pytest.approx(1.5)
@@ -89,17 +70,18 @@ def test_a_generator_that_stands_still_is_infinitely_far_and_finite():
         (distances.window_spectra, distances.log_spectral_distance),
         (distances.log_scales, distances.log_scale_distance),
         (lambda windows: measures.lagged_products(windows, 20), distances.autocorrelation_distance),
-        (lambda windows: windows, distances.kurtosis_difference),
-        (lambda windows: windows, distances.tail_ratio),
+        *((lambda windows: windows, each) for each in (distances.kurtosis_difference, distances.tail_ratio)),
+        *((lambda windows: windows[:, :3], each) for each in (distances.density, distances.coverage, distances.mmd_squared)),
     ):
-        assert np.isfinite(compare(describe(still), describe(real)))
+        assert np.isfinite(compare(describe(still), describe(real))) and np.isfinite(compare(describe(real), describe(still)))
 
 
-def test_convolution_features_written_out(refused):
+def test_convolution_features_written_out(monkeypatch):
+    monkeypatch.setattr(distances, "_NUM_KERNELS", 2)
     windows = normal(3, 40)
-    features = distances.convolution_features(windows, num_kernels=2, seed=4)
+    features = distances.convolution_features(windows)
     assert features.shape == (3, 3 * 2 * 2) and features.dtype == np.float32  # dilations 1, 2, 4
-    owner, expected = np.random.default_rng(4), []
+    owner, expected = np.random.default_rng(0), []
     for dilation in (1, 2, 4):
         kernels, thresholds = owner.standard_normal((9, 2)), owner.standard_normal(2)
         for pool in (np.max, lambda response, threshold: np.mean(response > threshold)):
@@ -109,30 +91,18 @@ def test_convolution_features_written_out(refused):
                 responses = [np.correlate(window, spread, mode="valid") for window in windows]
                 expected.append([pool(response) if pool is np.max else pool(response, threshold) for response in responses])
     assert features == pytest.approx(np.transpose(expected), abs=1e-5)
-    with refused("at least 9 samples"):
-        distances.convolution_features(normal(4, 8))
 
 
-def test_convolutions_tell_what_they_should_and_not_what_they_should_not():
-    features = distances.convolution_features
-    same = linear_classifier(features(normal(150, 200)), features(normal(150, 200, seed=1)))
-    assert same.auc == pytest.approx(0.5, abs=5 * np.sqrt(301 / (12 * 150**2))) and same.p_value() > 0.01
-    for other in (autoregressive(150, 200, 0.4), 1.5 * normal(150, 200), normal(150, 200) + 0.5):
-        told = linear_classifier(features(other), features(normal(150, 200, seed=1)))
-        assert told.auc > 0.95 and told.p_value(99) == 0.01
-
-
-def test_density_and_coverage_by_hand_and_in_theory():
-    real = np.array([[0.0], [1.0], [2.0], [10.0]])  # to the nearest: 1, 1, 1 and 8
-    generated = np.array([[0.5], [0.6], [9.0], [30.0]])
-    # 0.5 and 0.6 lie in the reach of 0 and 1, 9 in that of 10; 30 and the reach of 2 stay empty
-    assert distances.density(generated, real, num_neighbours=1) == pytest.approx(5 / 4)
-    assert distances.coverage(generated, real, num_neighbours=1) == pytest.approx(3 / 4)
+def test_density_and_coverage_by_hand_and_in_theory(monkeypatch):
     pairs = [(normal(300, 4, seed=2 * seed), normal(300, 4, seed=2 * seed + 1)) for seed in range(20)]
     assert np.mean([distances.coverage(*pair) for pair in pairs]) == pytest.approx(1 - 2.0**-5, abs=0.01)
     assert np.mean([distances.density(*pair) for pair in pairs]) == pytest.approx(1, abs=0.05)
-    with pytest.raises(ValueError, match="more than 5 real windows"):
-        distances.density(normal(9, 4), normal(5, 4))
+    monkeypatch.setattr(distances, "_NUM_NEIGHBOURS", 1)
+    real = np.array([[0.0], [1.0], [2.0], [10.0]])  # to the nearest: 1, 1, 1 and 8
+    generated = np.array([[0.5], [0.6], [9.0], [30.0]])
+    # 0.5 and 0.6 lie in the reach of 0 and 1, 9 in that of 10; 30 and the reach of 2 stay empty
+    assert distances.density(generated, real) == pytest.approx(5 / 4)
+    assert distances.coverage(generated, real) == pytest.approx(3 / 4)
 
 
 def test_mmd_written_out():
@@ -149,17 +119,6 @@ def test_mmd_written_out():
     assert distances.mmd_squared(generated, real) == pytest.approx(expected)
 
 
-def test_mmd_is_unbiased_and_its_p_value_uniform():
-    pairs = [(normal(30, 2, seed=2 * seed), normal(30, 2, seed=2 * seed + 1)) for seed in range(300)]
-    values = [distances.mmd_squared(*pair) for pair in pairs]
+def test_mmd_is_unbiased():
+    values = [distances.mmd_squared(normal(30, 2, seed=2 * seed), normal(30, 2, seed=2 * seed + 1)) for seed in range(300)]
     assert np.mean(values) == pytest.approx(0, abs=4 * np.std(values) / np.sqrt(300)) and min(values) < 0
-    p_values = np.array([distances.mmd_p_value(*pair, num_permutations=99) for pair in pairs])
-    assert np.mean(p_values) == pytest.approx(0.5, abs=5 / np.sqrt(12 * 300))
-    assert np.mean(p_values <= 0.1) == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 300))
-    assert distances.mmd_p_value(normal(30, 2) + 2, normal(30, 2, seed=1), num_permutations=99) == 0.01
-
-
-def test_features_that_stand_still_are_no_obstacle():
-    real, generated = normal(30, 3) * [1, 0, 1], normal(30, 3, seed=1)
-    found = [compare(generated, real) for compare in (distances.density, distances.coverage, distances.mmd_squared)]
-    assert np.isfinite(found).all()
