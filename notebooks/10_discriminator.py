@@ -207,8 +207,8 @@ def log_power(windows):
 
 judges = {
     "discriminator": lambda a, b: auc(-probability_real(a), -probability_real(b)),
-    "values at their places": lambda a, b: two_sample.linear_classifier(a, b).auc,
-    "power of each frequency": lambda a, b: two_sample.linear_classifier(log_power(a), log_power(b)).auc,
+    "values at their places": two_sample.linear_classifier,
+    "power of each frequency": lambda a, b: two_sample.linear_classifier(log_power(a), log_power(b)),
 }
 found = {name: judge(generated, held_out) for name, judge in judges.items()}
 floors = {name: judge(more_real, held_out) for name, judge in judges.items()}

@@ -169,7 +169,7 @@ class HeldOutJudge:
         self._unit = spread_of(real.noise)
         self._edges = [signal_edges(each) for each in _channels(real.clean)]
         self._held_out_features = self._features(held_out)
-        self.real_auc = boosted_trees(self._features(real), self._held_out_features, seed).auc
+        self.real_auc = boosted_trees(self._features(real), self._held_out_features, seed)
         self._noise_sd, self._nominal = spread_of(first.noise), self._seen(judged.evenly(number))
         self._anomalous = np.concatenate(list(anomalous_windows(self._nominal, self._noise_sd, seed, _NUM_ANOMALOUS).values()))
         self.real_alarms, self.real_recall = self._detected(self._seen(first))
@@ -222,7 +222,7 @@ class HeldOutJudge:
     def classify(self, model: NoiseModel, rng: np.random.Generator) -> float:
         """Returns the AUC of a classifier that separates windows with the model's noise from held-out real ones."""
         pieces = pieces_of(self._learnt, self._held_out, self._noise_on(self._few, model, rng))[-1]
-        return boosted_trees(self._features(pieces), self._held_out_features, self.seed).auc
+        return boosted_trees(self._features(pieces), self._held_out_features, self.seed)
 
 
 def _channels(windows: np.ndarray) -> list[np.ndarray]:

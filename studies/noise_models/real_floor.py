@@ -60,14 +60,6 @@ def _square_products(windows: np.ndarray) -> np.ndarray:
     return distances.lagged_square_products(windows, min(50, windows.shape[1] // 2))
 
 
-def _boosted_auc(generated: np.ndarray, real: np.ndarray) -> float:
-    return two_sample.boosted_trees(generated, real).auc
-
-
-def _linear_auc(generated: np.ndarray, real: np.ndarray) -> float:
-    return two_sample.linear_classifier(generated, real).auc
-
-
 def _rank_ratio(generated: np.ndarray, real: np.ndarray) -> float:
     return fidelity.effective_rank(generated) / fidelity.effective_rank(real)
 
@@ -82,8 +74,8 @@ MEASURES = (
     Measure("tail ratio", _values, distances.tail_ratio, perfect=1.0, is_ratio=True),
     Measure("autocorrelation distance", _products, distances.autocorrelation_distance),
     Measure("autocorrelation distance of squares", _square_products, distances.autocorrelation_distance),
-    Measure("classifier AUC, boosted trees", window_features, _boosted_auc, perfect=0.5, max_resplits=20),
-    Measure("classifier AUC, convolutions", distances.convolution_features, _linear_auc, perfect=0.5, max_resplits=50),
+    Measure("classifier AUC, boosted trees", window_features, two_sample.boosted_trees, perfect=0.5, max_resplits=20),
+    Measure("classifier AUC, convolutions", distances.convolution_features, two_sample.linear_classifier, perfect=0.5, max_resplits=50),
     Measure("density", window_features, distances.density, perfect=1.0, max_resplits=50),
     Measure("coverage", window_features, distances.coverage, perfect=1 - 2.0**-5, max_resplits=50),
     Measure("MMD squared", window_features, distances.mmd_squared, max_resplits=50),

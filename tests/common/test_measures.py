@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 import scipy.signal
 import scipy.stats
-from sklearn.metrics import roc_auc_score
 
 from enhsim_tf.common import measures
-from enhsim_tf.common.two_sample import HeldOut, two_sample_auc
+from enhsim_tf.common.two_sample import two_sample_auc
 from enhsim_tf.common.window_features import signal_edges, signal_features, window_features
 
 
@@ -153,27 +152,3 @@ def test_two_sample_folds_hold_out_neighbours():
     levels = np.random.default_rng(0).permutation(40).reshape(2, 20)
     generated, real = (np.repeat(kind, 10)[:, None] + 0.01 * normal(200, 50) for kind in levels)
     assert two_sample_auc(generated, real, seed=0) < 0.75
-
-
-def test_permutation_p_value_of_scores():
-    folds, labels = np.tile(np.repeat([0, 1], 30), 2), np.repeat([1, 0], 60)
-    assert HeldOut(labels + 0.1 * normal(120), labels, folds).p_value(99) == 0.01  # none of 99 is as large
-    by_chance = [HeldOut(normal(120, seed=seed), labels, folds).p_value(99) for seed in range(200)]
-    assert np.mean(by_chance) == pytest.approx(0.5, abs=5 / np.sqrt(12 * 200))
-    assert np.mean(np.array(by_chance) <= 0.1) == pytest.approx(0.1, abs=5 * np.sqrt(0.09 / 200))
-    # within each fold all scores are equal: whatever the labels, no order of them is larger
-    assert HeldOut(folds.astype(float), labels, folds).p_value(99) == 1
-
-
-def test_permutation_p_value_written_out():
-    folds, labels, scores = np.tile(np.repeat([0, 1], 5), 2), np.repeat([1, 0], 10), normal(20) + np.repeat([0.2, 0], 10)
-    owner, areas = np.random.default_rng(1), []
-    for _ in range(2_000):
-        shuffled = labels.copy()
-        for fold in (0, 1):
-            shuffled[folds == fold] = owner.permutation(labels[folds == fold])
-        areas.append(roc_auc_score(shuffled, scores))
-    held_out = HeldOut(scores, labels, folds)
-    expected = np.mean(np.array(areas) >= held_out.auc - 1e-9)
-    assert 0.01 < expected < 0.5
-    assert held_out.p_value(2_000) == pytest.approx(expected, abs=5 * np.sqrt(2 * expected / 2_000))

@@ -83,7 +83,7 @@ def test_noise_on_levels_is_not_told_from_itself_by_rounding_errors_of_32_bits()
     stored = (signal + noise).astype(np.float32) - signal.astype(np.float32)
     assert 0 < np.max(np.abs(stored - noise)) < 1e-6
     exact, real = noise[:300], stored[300:]
-    assert boosted_trees(window_features(exact / 0.1), window_features(real / 0.1)).auc > 0.7
+    assert boosted_trees(window_features(exact / 0.1), window_features(real / 0.1)) > 0.7
     signal32, places = signal.astype(np.float32), 60 * np.arange(600)
     learnt, judged = (NoiseWindows(stored[some], signal32[some], places[some]) for some in (slice(0, 300), slice(300, None)))
     judgement = HeldOutJudge(learnt, judged, seed=0).judge("exact", WindowBootstrap(exact), rng)
