@@ -16,7 +16,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.two_sample import boosted_trees
-from enhsim_tf.common.window_features import DECIMALS, signal_edges, signal_features, window_features
+from enhsim_tf.common.window_features import window_features
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject
 from enhsim_tf.detection.registry import DETECTORS
@@ -37,6 +37,9 @@ _LEAST_WINDOWS = 20
 _NUM_ANOMALOUS = 60  # windows with anomalies, for each kind and severity
 _ENOUGH_PIECES, _LEAST_PIECE = 200, 16  # disjoint pieces that the classifier should see, and their least length in samples
 _DRAW = 73  # number of the random draw
+DECIMALS = 4
+"""Decimals, in standard deviations of the noise, at which noise is compared. Smaller differences are rounding errors of 32-bit telemetry, by
+which a classifier tells quantised noise from itself."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -223,6 +226,33 @@ class HeldOutJudge:
         """Returns the AUC of a classifier that separates windows with the model's noise from held-out real ones."""
         pieces = pieces_of(self._learnt, self._held_out, self._noise_on(self._few, model, rng))[-1]
         return boosted_trees(self._features(pieces), self._held_out_features, self.seed)
+
+
+def signal_edges(signal_windows: np.ndarray) -> np.ndarray:
+    """Where `signal_features` divides a signal's levels, and its slopes, into thirds: both edges of each, shape `(2, 2)`."""
+    values = np.asarray(signal_windows, np.float64)
+    return np.stack([np.quantile(each, (1 / 3, 2 / 3)) for each in (values, np.gradient(values, axis=1))])
+
+
+def signal_features(noise_windows: np.ndarray, signal_windows: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Computes twelve features of noise and the signal below it, which tell noise that depends on the signal from noise that does not.
+
+    Both are windows of the same shape; the edges are those of `signal_edges`.
+
+    The features are the mean of the noise and the logarithm of its root mean square, each where the signal is low, medium and
+    high, and where it falls, is flat and rises. Where a window has no such samples, they are those of the whole window.
+    """
+    noise, signal = np.asarray(noise_windows, np.float64), np.asarray(signal_windows, np.float64)
+    columns = []
+    for values, (low, high) in zip((signal, np.gradient(signal, axis=1)), edges, strict=True):
+        third = (values > low).astype(int) + (values > high)
+        for number in range(3):
+            is_there = third == number
+            is_there[~is_there.any(axis=1)] = True
+            count = is_there.sum(axis=1)
+            mean_square = np.sum(noise**2, axis=1, where=is_there) / count
+            columns += [np.sum(noise, axis=1, where=is_there) / count, np.log(mean_square + 1e-24) / 2]
+    return np.stack(columns, axis=1)
 
 
 def _channels(windows: np.ndarray) -> list[np.ndarray]:

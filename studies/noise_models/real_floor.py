@@ -17,7 +17,8 @@ from threadpoolctl import threadpool_limits
 from enhsim_tf.common import measures as fidelity
 from enhsim_tf.common import two_sample
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.window_features import DECIMALS, window_features
+from enhsim_tf.common.window_features import window_features
+from enhsim_tf.simulator.noise_choice import DECIMALS
 from studies.noise_models import distances
 
 _BLOCK = 10  # consecutive windows that stay together when the windows are split

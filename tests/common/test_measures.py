@@ -7,7 +7,7 @@ import scipy.stats
 
 from enhsim_tf.common import measures
 from enhsim_tf.common.two_sample import two_sample_auc
-from enhsim_tf.common.window_features import signal_edges, signal_features, window_features
+from enhsim_tf.common.window_features import window_features
 
 
 def normal(*shape, seed=0):
@@ -106,28 +106,6 @@ def test_eight_bands_that_double_in_width():
     assert features.shape == (8, 14)
     assert np.argmax(features[:, 6:], axis=1).tolist() == list(range(8))
     assert np.isfinite(window_features(np.full((2, 500), 7.0, np.float32))).all()
-
-
-def test_edges_divide_levels_and_slopes_into_thirds():
-    signal = np.arange(30.0).reshape(3, 10) ** 2
-    for values, (low, high) in zip((signal, np.gradient(signal, axis=1)), signal_edges(signal), strict=True):
-        assert np.sum(values <= low) == pytest.approx(10, abs=1) and np.sum(values > high) == pytest.approx(10, abs=1)
-
-
-def test_features_are_mean_and_scale_of_the_noise_at_each_level_and_slope():
-    signal = np.array([[0.0, 0, 1, 2, 2, 1, 0, 0]])  # slopes: 0 0.5 1 0.5 -0.5 -1 -0.5 0
-    noise = np.array([[1.0, 3, 4, 5, 7, 2, 1, 3]])
-    found = signal_features(noise, signal, np.array([[0.5, 1.5], [-0.25, 0.25]])).reshape(6, 2)
-    places = [1, 3, 1, 3], [4, 2], [5, 7], [7, 2, 1], [1, 3], [3, 4, 5]  # low, medium, high, falls, flat, rises
-    for (mean, log_scale), there in zip(found, places, strict=True):
-        assert mean == pytest.approx(np.mean(there)) and log_scale == pytest.approx(np.log(np.mean(np.square(there))) / 2)
-
-
-def test_what_a_window_does_not_contain_is_taken_from_the_whole_window():
-    noise = np.array([[1.0, -1, 2, 2], [0.0, 0, 0, 0]])
-    found = signal_features(noise, np.full((2, 4), 5.0), np.array([[0.0, 1.0], [-1.0, 1.0]])).reshape(2, 6, 2)
-    np.testing.assert_allclose(found[0], np.tile([1.0, np.log(2.5) / 2], (6, 1)))
-    assert np.isfinite(found[1]).all()
 
 
 # -- two-sample tests ------------------------------------------------------------------------------------------------------

@@ -12,6 +12,8 @@ from enhsim_tf.simulator.noise_choice import (
     choose,
     choose_noise,
     pieces_of,
+    signal_edges,
+    signal_features,
 )
 
 
@@ -88,3 +90,25 @@ def test_noise_on_levels_is_not_told_from_itself_by_rounding_errors_of_32_bits()
     learnt, judged = (NoiseWindows(stored[some], signal32[some], places[some]) for some in (slice(0, 300), slice(300, None)))
     judgement = HeldOutJudge(learnt, judged, seed=0).judge("exact", WindowBootstrap(exact), rng)
     assert judgement.auc < 0.58
+
+
+def test_edges_divide_levels_and_slopes_into_thirds():
+    signal = np.arange(30.0).reshape(3, 10) ** 2
+    for values, (low, high) in zip((signal, np.gradient(signal, axis=1)), signal_edges(signal), strict=True):
+        assert np.sum(values <= low) == pytest.approx(10, abs=1) and np.sum(values > high) == pytest.approx(10, abs=1)
+
+
+def test_features_are_mean_and_scale_of_the_noise_at_each_level_and_slope():
+    signal = np.array([[0.0, 0, 1, 2, 2, 1, 0, 0]])  # slopes: 0 0.5 1 0.5 -0.5 -1 -0.5 0
+    noise = np.array([[1.0, 3, 4, 5, 7, 2, 1, 3]])
+    found = signal_features(noise, signal, np.array([[0.5, 1.5], [-0.25, 0.25]])).reshape(6, 2)
+    places = [1, 3, 1, 3], [4, 2], [5, 7], [7, 2, 1], [1, 3], [3, 4, 5]  # low, medium, high, falls, flat, rises
+    for (mean, log_scale), there in zip(found, places, strict=True):
+        assert mean == pytest.approx(np.mean(there)) and log_scale == pytest.approx(np.log(np.mean(np.square(there))) / 2)
+
+
+def test_what_a_window_does_not_contain_is_taken_from_the_whole_window():
+    noise = np.array([[1.0, -1, 2, 2], [0.0, 0, 0, 0]])
+    found = signal_features(noise, np.full((2, 4), 5.0), np.array([[0.0, 1.0], [-1.0, 1.0]])).reshape(2, 6, 2)
+    np.testing.assert_allclose(found[0], np.tile([1.0, np.log(2.5) / 2], (6, 1)))
+    assert np.isfinite(found[1]).all()
