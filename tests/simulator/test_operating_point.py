@@ -1,7 +1,9 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from enhsim_tf.simulator.operating_point import beyond, changed_properties, lasting
+from enhsim_tf.simulator.operating_point import beyond, changed_properties, find_departure, lasting
 
 
 @pytest.mark.parametrize(
@@ -53,3 +55,38 @@ def test_windows_beyond_the_limits_are_marked():
     series[40:] = 3.0
     limits = np.array([[-1.0], [0.0]]), np.array([[2.0], [2.0]])
     np.testing.assert_array_equal(np.flatnonzero(beyond(series, limits, 10)), np.arange(40, 60))
+
+
+def departed(level, amplitude, scored):
+    """Forty nominal periods of 20 samples, then forty with another level and amplitude, in two stretches; what `find_departure` says."""
+    wave = np.sin(2 * np.pi * np.arange(800) / 20)
+    series = np.concatenate([wave, level + amplitude * wave]).astype(np.float32)[:, None]
+    nominal = series[:800]
+    simulator = SimpleNamespace(window=20, nominal=nominal, nominal_run=None, judged_series=lambda telemetry, run: [telemetry])
+    scores = np.where(np.arange(1_600) < 800, 0.5, scored)
+    return find_departure(simulator, lambda moved: moved[:, 0], scores, [(0, series[:1_000]), (1_000, series[1_000:])]), wave
+
+
+def test_scores_after_a_departure_are_those_of_telemetry_moved_back():
+    found, wave = departed(level=3.0, amplitude=2.0, scored=2.0)
+    assert found.begin == 790, "half of the window that begins there has the other level"
+    assert set(found.what) == {"level", "amplitude"}
+    np.testing.assert_allclose(found.scores[:790], 0.5)
+    np.testing.assert_allclose(found.scores[800:], wave, atol=1e-5)  # the score here is the telemetry itself
+
+
+# windows of nominal telemetry all have the level 0 and the standard deviation .707, of which a tenth is allowed on each side
+@pytest.mark.parametrize(
+    ("level", "amplitude", "begin"),
+    [(0.07, 1.0, None), (-0.07, 1.0, None), (0.08, 1.0, 800), (-0.08, 1.0, 800), (0.0, 1.09, None), (0.0, 1.12, 800), (0.0, 0.88, 800)],
+)
+def test_telemetry_that_is_not_flagged_has_left_beyond_a_tenth_of_its_amplitude(level, amplitude, begin):
+    found, _ = departed(level, amplitude, scored=0.5)
+    assert (found and found.begin) == begin
+
+
+def test_a_simulator_without_nominal_telemetry_names_the_shape():
+    simulator, scores = SimpleNamespace(window=20, nominal=None), np.repeat([0.5, 2.0], 400)
+    found = find_departure(simulator, None, scores, [(0, np.zeros((800, 1)))])
+    assert (found.begin, found.what) == (400, ("shape",))
+    np.testing.assert_array_equal(found.scores, scores)
