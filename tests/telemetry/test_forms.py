@@ -10,6 +10,7 @@ import pytest
 from enhsim_tf.datasets.inject import InjectOptions, inject_channel
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.times import epoch_unit
 from enhsim_tf.telemetry.reading.columns import anomalous
 from enhsim_tf.telemetry.sources import read_source
 
@@ -481,3 +482,12 @@ def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused)
 
 def test_rows_without_the_word_of_others_are_a_series():
     check(read_source(long(host=("a", None)))["a"])
+
+
+# from 1979 (3.1e8 s) to 2103 (4.2e9 s)
+@pytest.mark.parametrize(
+    ("size", "unit"),
+    [(3.1e8, "s"), (3.0e8, None), (4.2e9, "s"), (4.3e9, None), (3.1e11, "ms"), (4.2e15, "us"), (3.1e17, "ns"), (4.3e18, None)],
+)
+def test_the_size_of_a_number_says_the_unit_of_a_time_since_1970(size, unit):
+    assert epoch_unit(size) == unit
