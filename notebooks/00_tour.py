@@ -91,7 +91,7 @@ assert after < bound[budget]
 assert rough > 2 * smooth
 
 # %% [markdown]
-# A matrix does better. (Notebook 04 tunes it otherwise: 0.031.)
+# A matrix does better. (Notebook 04 tries other penalties: 0.031.)
 #
 # ## Step 6: the noise
 #
@@ -245,7 +245,7 @@ if budget == "full":  # noise of the wrong size would teach a detector nothing
 # | stage | where it fails |
 # |---|---|
 # | enhancer | one matrix does better; five of six faults have more than twice the nominal error (C9) |
-# | moving average | a little of the waveform stays in the noise |
+# | moving average | a little of the waveform stays in the noise (notebook 08) |
 # | noise GAN | few dimensions, although the networks are in balance (C6) |
 # | sum | the PCA residual separates it from telemetry (C8) |
 
@@ -259,7 +259,7 @@ assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 
 # %% [markdown]
 # **Answer.** Not as it stands: the signal is nearly right, but two of three detectors alarm on more than a quarter of nominal telemetry.
-# `fit` chooses among noise models instead ([noise](../docs/noise.md)).
+# The tool of this project, `python -m enhsim_tf fit`, chooses among noise models instead ([noise](../docs/noise.md)).
 #
 # ## Exercises
 #

@@ -1,15 +1,15 @@
 # %% [markdown]
 # # The pipeline (Figure 1)
 #
-# **Question:** how do a crude simulator and two networks become realistic telemetry, and what do they take for granted about noise?
+# **Question:** how do a crude simulator and two networks make realistic telemetry?
 #
 # - **After this lesson** you can name the nine steps of the paper, compute a window of telemetry step by step, and say what the pipeline
 #   assumes about noise.
 # - **You should know** nothing in particular; every step has a lesson of its own.
-# - **Terms:** [coarse simulator](../docs/glossary.md#coarse-simulator), [enhancer](../docs/glossary.md#enhancer),
-#   [generator](../docs/glossary.md#generator-and-discriminator),
-#   [degraded mode](../docs/glossary.md#degraded-mode-severity-onset); *latent vector*: the random numbers that a generator turns into
-#   noise.
+# - **Terms:** *enhancer*: the network that turns square waves into a waveform; *generator*: the network that turns random numbers into
+#   noise; [coarse simulator](../docs/glossary.md#coarse-simulator), [enhancer](../docs/glossary.md#enhancer),
+#   [generator](../docs/glossary.md#generator-and-discriminator), [degraded mode](../docs/glossary.md#degraded-mode-severity-onset); *latent
+#   vector*: the random numbers that a generator turns into noise.
 #
 # **What the paper says** (section 2): nine numbered steps, whose results "are then combined to produce the final, high-fidelity
 # output". Two networks are trained apart: one makes the waveform, one makes the noise.
@@ -21,7 +21,7 @@ from lesson_tools import check_answer, claim, degraded, drawing, open_pipeline, 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED
 
 pipeline, budget = open_pipeline()
-claim("C2", "C7")
+claim("C7")
 
 # %%
 show(pipeline, "fig01_pipeline")
@@ -32,7 +32,8 @@ show(pipeline, "fig01_pipeline")
 #
 # ## Step by step
 #
-# Both networks are plain Keras models. A window needs four lines:
+# Both networks are plain Keras models. They learn from telemetry of a vehicle or a fine simulator (step 4): the enhancer from the
+# telemetry, the generator from the noise that is left when a moving average is subtracted (step 6). Then a window needs four lines:
 
 # %%
 enhancer, generator = pipeline.enhancer, pipeline.generator
@@ -90,9 +91,9 @@ assert difference < 1e-5
 #
 # ## Exercises
 #
-# **1.** A detector needs days, not windows. The next cell puts 100 generated windows of noise end to end on the enhanced signal, as
-# figure 7 does. Has the series seams? Complete the function: the mean size of the step from sample to sample, at each of the 500 places
-# within a window.
+# **1.** A detector needs days, not windows. The next cell puts 100 generated windows of noise end to end on the enhanced signal, as figure
+# 7 does. Are the edges of the windows visible in the series? Complete the function: the mean size of the step from sample to sample, at
+# each of the 500 places within a window.
 
 # %%
 window = pipeline.settings.window
@@ -118,7 +119,7 @@ def expected(values):
 check_answer(
     mean_step_by_place(series["real"]),
     lambda found: np.allclose(found, expected(series["real"])),
-    "steps.reshape(-1, window) has a row for each window.",
+    "Place 0 of every window is at 0, 500, 1,000, ...",
 )
 
 # %% [markdown]

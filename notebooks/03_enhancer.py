@@ -139,9 +139,9 @@ with drawing(alt, height=2.3, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the held-out loss stays above the dotted line and hardly falls after the first few epochs. In the later epochs the training
-# loss is lower, because a network with 13.7 million parameters learns some of the noise of the windows that it sees 40 times by heart. What
-# lies between the two curves is this memory.
+# *What to see:* the held-out loss stays above the dotted line and hardly falls after about ten epochs, apart from a jump. In the later
+# epochs the training loss is lower, because a network with 13.7 million parameters learns some of the noise of the windows that it sees 40
+# times by heart. What lies between the two curves is this memory.
 
 # %%
 say(

@@ -11,8 +11,6 @@
 #   [degraded mode, severity, onset](../docs/glossary.md#degraded-mode-severity-onset); *roughness*: the standard deviation of the steps
 #   from sample to sample.
 #
-# The text describes results at full budget (`ENHSIM_TF_BUDGET=smoke` runs every step with small counts, and then some of it does not hold).
-#
 # **What the paper says** (section 2.2): after 40 epochs the network turns the quantised simulation into a smooth waveform, at hardly
 # any cost. And then it says what is wrong with the result: "The signal is too clean."
 
@@ -159,9 +157,8 @@ with drawing(alt, height=1.7, title=title) as panel:
     panel.invert_yaxis()
 
 # %% [markdown]
-# *What to see:* all three estimates are far better than the simulator, and the one matrix comes closest to the truth. In this example, the
-# map from square waves to sines of the same phase is close to linear on the few windows that occur. So few that all held-out inputs
-# occurred in training:
+# *What to see:* all three estimates are far better than the simulator, and the one matrix comes closest to the truth. On the few
+# windows that occur, one matrix is enough for the map from square waves to sines. So few that all held-out inputs occurred in training:
 
 # %%
 seen = {window.tobytes() for window in train["coarse"]}
@@ -179,9 +176,9 @@ claim("C1", "C2", "C3")
 # %% [markdown]
 # ## The verdicts
 #
-# The last limit of C1, below ridge regression (which the reproduction fits with other penalties than this lesson, and less well), and the
-# last one of C2, twice the time of one line of NumPy, are hurdles of this project. They are shown and do not decide. The speed (C2) depends
-# on the machine and on what else it does. Elsewhere in this book it comes from another run, and differs.
+# C1 has one more limit, the error of ridge regression, and C2 one more, twice the time of a line of NumPy. This project added both; they
+# are shown and do not decide. (The reproduction tries other penalties, so its ridge regression has another error.) C2 compares with two
+# simulators of the battery of notebook 27. Speeds depend on the machine.
 
 # %%
 records = verdict(pipeline, "C1", "C2", "C3")

@@ -4,7 +4,7 @@
 # **Question:** if you cannot see the difference between real and generated telemetry, is there none?
 #
 # - **After this lesson** you can test your own eye honestly, measure what it misses, and find out what a classifier looks at.
-# - **You should know** how the noise is generated (notebook 09). The quiz comes first; do not read ahead.
+# - **You should know** nothing in particular; notebook 09 explains how the noise is made. The quiz comes first; do not read ahead.
 # - **Terms:** [AUC](../docs/glossary.md#auc): the probability that a classifier gives a generated window a higher score than a real one,
 #   0.5 by chance and 1 if it always does; [effective rank](../docs/glossary.md#effective-rank): the number of dimensions in which a set
 #   of windows varies.
@@ -57,8 +57,9 @@ say(f"Three or four right by pure guessing: **{lucky:.0%}**. One try of eight wi
 assert len(truly_generated) == 4
 
 # %% [markdown]
-# A thousand windows of each kind, and a classifier that judges windows it was not trained on, are a test. (C7 asks for less: generated
-# telemetry must not be easier to recognise than telemetry that is 10 % larger.)
+# A thousand windows of each kind, and a classifier that judges windows it was not trained on, are a test. (The boosted trees see
+# fourteen features of a window, such as scale and spectrum. C7 asks for less: generated telemetry must not be easier to recognise than
+# telemetry that is 10 % larger.)
 
 # %%
 (record,) = verdict(pipeline, "C7")
@@ -83,7 +84,7 @@ groups = {"real": (four_real, REAL, "-"), "generated": (four_generated, GENERATE
 means = {name: group.mean(axis=0) for name, (group, _, _) in groups.items()}
 ratio = {name: means[name].std() / group.std() for name, (group, _, _) in groups.items()}
 alt = "Mean of four real and of four generated windows of noise"
-title = f"Generated windows share a pattern: their mean keeps {ratio['generated']:.2f} (real: {ratio['real']:.2f})"
+title = f"The mean of four windows keeps {ratio['generated']:.2f} of a generated size, {ratio['real']:.2f} of a real one"
 with drawing(alt, 2, 1.8, title, sharey=True) as panels:
     for panel, (name, (_, color, _)) in zip(panels, groups.items()):
         panel.plot(means[name], color=color, linewidth=0.6)

@@ -155,9 +155,9 @@ assert np.abs(measured / predicted - 1).max() < 0.03
 # %% [markdown]
 # ## The filter leaves a mark
 #
-# White noise was put in, but what comes out is not quite white, because near samples share most of the average that was subtracted. For
-# a lag $k$ up to half the width, the covariance of the noise alone is $-\sigma^2\,(w+k)/w^2$. The remains of the waves add a little at
-# all lags.
+# White noise was put in, but what comes out is not quite white, because near samples share most of the average that was subtracted. For a
+# lag $k$ up to half the width, the covariance of the noise alone is $-\sigma^2\,(w+k)/w^2$; beyond that it is $\sigma^2\,(w-k)/w^2$, hence
+# the step. The remains of the waves add a little at all lags.
 
 # %%
 lags = np.arange(1, 40)

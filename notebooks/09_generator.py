@@ -1,7 +1,7 @@
 # %% [markdown]
 # # The generator (Figure 9)
 #
-# **Question:** how can a network turn 16 random numbers into 500 samples of noise, and what limits the noise that it can make?
+# **Question:** what limits the noise that a network can make of 16 random numbers?
 #
 # - **After this lesson** you can write the generator and one update of it in plain Keras, and find the bottleneck of a generator by
 #   counting dimensions.
@@ -116,8 +116,8 @@ say(
 #
 # $$G(z)=\tanh\left(b+\sum_{i=1}^{64}h_i(z)\,K_i\right)$$
 #
-# Before the tanh, a thousand windows therefore vary in at most 64 of the 500 dimensions. Real noise varies in all of them. To see it,
-# sort the dimensions by their share of the variance, which are the squared singular values of the windows:
+# Before the tanh, a thousand windows therefore vary in at most 64 of the 500 dimensions. Real noise varies in nearly all of them. To see
+# it, sort the dimensions by their share of the variance, which are the squared singular values of the windows:
 
 # %%
 trained = pipeline.generator
@@ -156,7 +156,8 @@ with drawing(alt, height=2.3, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the shares of real noise decrease slowly up to the last twenty. Those of generated noise fall steeply, and before the
+# *What to see:* the shares of real noise decrease slowly up to the last twenty (the moving average has
+# taken the slow shapes away). Those of generated noise fall steeply, and before the
 # tanh they end at 64. One number says it: the *effective rank*, the exponential of the entropy of the shares $p_i$,
 #
 # $$\mathrm{rank}=\exp\left(-\sum_i p_i\ln p_i\right).$$
@@ -184,7 +185,7 @@ assert rank(generated) < rank(real) / 2
 
 # %% [markdown]
 # **Answer.** Sixteen numbers and 64 neurons write every window as a sum of 64 shapes, so that generated windows differ from each other in
-# few dimensions, and real ones in all. Many detectors look at just that: what lies outside the main dimensions (notebook 13).
+# few dimensions, and real ones in nearly all. Many detectors look at just that: what lies outside the main dimensions (notebook 13).
 #
 # ## Exercises
 #

@@ -280,7 +280,7 @@ numbers = [number_of_batch(windows) for windows in batches]
 check_answer(
     None if numbers[0] is None else numbers,
     lambda found: abs(roc_auc_score([0] * 20 + [1] * 20, found) - 0.5) > 0.49,
-    "What do all windows of a generated batch have in common? Notebook 09 has one answer, the mean window another.",
+    "What would you compute from all 200 windows that you cannot compute from one?",
 )
 
 # %% [markdown]

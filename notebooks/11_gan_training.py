@@ -327,7 +327,7 @@ check_answer(
 #     return float(error)
 # ```
 #
-# Two updates are two steps of Adam in an iteration, so the discriminator learns faster with them. The paper speaks of one batch; the
+# Two updates are two steps of Adam in an iteration, so it takes twice as many. The paper speaks of one batch; the
 # author's public code takes two. `python -m enhsim_tf.reproduce --set "update=two of 200"` shows what it changes.
 #
 # </details>

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Accuracy and loss (Figure 12)
 #
-# **Question:** when are the two networks of a GAN in balance, and what does this balance prove about the noise?
+# **Question:** what does the balance between the two networks of a GAN prove about the noise?
 #
 # - **After this lesson** you can compute accuracy and loss of a discriminator by hand, say how much of a curve is chance, and name a
 #   property of noise that no such curve shows.
@@ -88,8 +88,8 @@ assert budget == "smoke" or together < -0.5
 # %%
 error = np.sqrt(0.5 * 0.5 / settings.rows)
 say(
-    f"Standard error of an accuracy near one half, from {settings.rows} rows: **{error:.1%}**. Differences of "
-    f"less than about {2 * error:.0%} mean nothing."
+    f"Standard error of an accuracy near one half, from {settings.rows} rows: **{error:.1%}**. An accuracy within {2 * error:.0%} of one "
+    f"half cannot be told from chance; two accuracies must differ by about {2 * 2**0.5 * error:.0%}."
 )
 
 # %% [markdown]
@@ -133,6 +133,9 @@ assert rank < {"full": 0.3, "smoke": 0.9}[budget]
 assert abs(np.log(after)) < {"full": 0.15, "smoke": 3.0}[budget]
 
 # %% [markdown]
+# C4 looks at the standard deviation and at the lag-1 correlation, and asks when both have stopped changing. The noise can therefore have
+# the right standard deviation early and settle late.
+#
 # One seed is not enough: the [study of readings](../studies/readings/README.md) repeats this over seeds, readings of the paper and
 # processors.
 
@@ -189,7 +192,7 @@ sizes = [size_after_training(speed) for speed in (0.1, 10)]
 check_answer(
     None if sizes[0] is None else sizes,
     lambda found: found[1] < 0.7 * found[0],
-    "train_gan(pair, short, 0, 400); generate_noise(pair.generator, 500, small, np.random.default_rng(0))",
+    "First train the pair, then generate; both functions are imported above.",
 )
 
 # %% [markdown]
@@ -222,7 +225,7 @@ check_answer(
 #     print(f"speed {speed}: {size_after_training(speed):.1f} times the real standard deviation")
 # ```
 #
-# The two numbers that are printed are the answer. The slow discriminator leaves the noise larger than the fast one does: being far ahead
-# does no harm to the size of the noise here, and learning too little does. Whether it harms the rank, this exercise does not ask.
+# The two numbers that are printed are the answer. In this one run, the slow discriminator leaves the noise larger than the fast one does.
+# Whether either harms the rank, this exercise does not ask.
 #
 # </details>

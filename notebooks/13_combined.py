@@ -168,7 +168,7 @@ np.testing.assert_allclose(
 
 # %%
 alt = "False-alarm rate of the PCA residual on real nominal telemetry, by the data that it was trained on"
-title = "The sum looks right, but detectors trained on it flag real telemetry"
+title = "The sum looks right, but a detector trained on it flags telemetry"
 colors = {"coarse": COARSE, "enhanced": ENHANCED, "enhanced + GAN noise": GENERATED, "real": REAL}
 with drawing(alt, height=1.9, title=title) as panel:
     bars = panel.barh(list(rates), list(rates.values()), color=[colors.get(kind, QUIET) for kind in rates])
@@ -180,9 +180,9 @@ with drawing(alt, height=1.9, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the detector that was trained on the paper's sum is as useless as the one that was trained without noise, although a plot
-# shows hardly any difference to telemetry. Noise of one line, Gaussian and of the same standard deviation, is good enough here (other
-# notebooks draw other windows and other noise, and their rates differ a little), where the real noise is white (notebook 25 has other
-# noise). (The low rate of *coarse* is no merit: its threshold is too high, notebook 22.)
+# shows hardly any difference to telemetry. Gaussian noise of the same standard deviation takes one line and is good enough here, where the
+# real noise is white. Rates differ a little between notebooks, which draw other windows. *Coarse* alarms seldom because its threshold is
+# too high (notebook 22).
 
 # %%
 say(", ".join(f"{kind}: **{rate:.1%}**" for kind, rate in rates.items()) + ".")

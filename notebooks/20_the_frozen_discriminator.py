@@ -1,7 +1,7 @@
 # %% [markdown]
 # # The frozen discriminator: a pitfall of Keras 3
 #
-# **Question:** why does the classic way to train a GAN teach the discriminator nothing under Keras 3, and why does nobody notice?
+# **Question:** why does the classic way to train a GAN teach the discriminator nothing under Keras 3?
 #
 # - **After this lesson** you can recognise the pitfall in code, explain it, write the step that works, and write the test that would
 #   have found it.
@@ -119,7 +119,7 @@ assert [warning.category for warning in heard] == [UserWarning]
 #
 # | | when is `trainable` read? | so `discriminator.train_on_batch` |
 # |---|---|---|
-# | Keras 2 | at `compile`, before the freeze | trains all its weights |
+# | Keras 2 (by its documentation) | at `compile`, before the freeze | trains all its weights |
 # | Keras 3 | when the training step is first built, after the freeze | trains none |
 
 # %%
@@ -182,7 +182,7 @@ with drawing(alt, 2, 2.4, title, sharey=True) as panels:
 # %% [markdown]
 # *What to see:* in both panels the loss on generated noise moves, which looks like training. On the left it rises, and the loss on real
 # noise stands still: only the generator learns. On the right the discriminator learns to recognise generated noise within some twenty
-# steps, while its loss on real noise rises.
+# steps, while its loss on real noise rises at first.
 
 # %%
 (classic_first, classic_last), (named_first, named_last) = (

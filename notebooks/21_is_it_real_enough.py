@@ -129,7 +129,7 @@ with drawing(alt, height=1.9, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* one fixed pattern lies under all windows of the GAN. It is as rough as noise, so nobody sees it in a single window or in a
-# histogram. The bumps of the spectrum are its bumps.
+# histogram. Most bumps of the spectrum are those of the pattern.
 
 # %%
 alike = np.corrcoef(power(noises["GAN"].mean(axis=0)[None]), spectrum["GAN"])[0, 1]
@@ -277,7 +277,7 @@ factor = None  # your answer: rank from 200 windows, divided by rank from 1,000
 check_answer(
     factor,
     lambda answer: abs(answer - measures.effective_rank(many[:200]) / measures.effective_rank(many)) < 0.02,
-    "measures.effective_rank(many[:200])",
+    "Which function computes a rank above?",
 )
 
 # %% [markdown]

@@ -3,8 +3,7 @@
 #
 # **Question:** a detector is trained on a simulation. What decides how often it raises a false alarm on real telemetry?
 #
-# - **After this lesson** you can explain why a perfect simulator without noise gives a useless alarm, say which noise helps, and repair a
-#   threshold with a few real windows.
+# - **After this lesson** you can say how the training noise sets the threshold, and repair a threshold with a few real windows.
 # - **You should know** the PCA residual and the threshold of notebook 13, and ridge regression (notebook 04).
 # - **Terms:** [nominal](../docs/glossary.md#nominal): without a fault; [arm](../docs/glossary.md#arm): one kind of training windows; [PCA
 #   residual](../docs/glossary.md#pca-residual), [conformal threshold](../docs/glossary.md#conformal-threshold); [false-alarm
@@ -263,7 +262,8 @@ assert not is_full or (found["coarse"] < 0.02 and limits["enhanced + GAN"] < 0.0
 #
 # ## All of it at once
 #
-# A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, with five seeds.
+# A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, with five seeds. It has no Gaussian noise,
+# which does well here because the real noise is Gaussian.
 #
 # ![False alarms by training data](../studies/robustness/results/false_alarms.png)
 
@@ -297,8 +297,8 @@ _ = verdict(pipeline, "C8")
 
 # %% [markdown]
 # **Answer.** The noise of the training windows, and the detector. For the PCA residual, the scale of the noise must be right to a few per
-# cent, and noise of few directions or of another kind sets a wrong threshold even then. Noise that is drawn from real residuals set a
-# right one in all of these cases; but its detector found fewer ramps than the one that was trained on real windows.
+# cent, and noise of few directions or of another kind sets a wrong threshold even then. Noise drawn from real noise or residuals set a
+# right one in each case tried here; but its detector found fewer ramps than the one that was trained on real windows.
 #
 # ## Exercises
 #

@@ -39,7 +39,7 @@ noises = {kind: draw_noise(kind) for kind in ("white", "bursts")}
 # %%
 alt = "A window of white noise, and one of noise in bursts"
 with drawing(
-    alt, 2, 1.7, "Both noises have the same standard deviation and the same spectrum", sharey=True
+    alt, 2, 1.7, "Equal standard deviation, and uncorrelated neighbours in both", sharey=True
 ) as panels:
     for panel, (kind, (_, judged)) in zip(panels, noises.items()):
         panel.plot(judged[3], color=REAL, linewidth=0.6)
@@ -48,8 +48,7 @@ with drawing(
     panels[0].set(ylabel="noise (standard deviations)")
 
 # %% [markdown]
-# *What to see:* in the noise on the right, loud stretches interrupt quiet ones. Neighbouring samples are uncorrelated in both. (That
-# holds for all distances, so both spectra are flat.)
+# *What to see:* in the noise on the right, loud stretches interrupt quiet ones. Neighbouring samples are uncorrelated in both.
 
 # %%
 for kind, (learnt, _) in noises.items():
@@ -301,8 +300,8 @@ with drawing(alt, 2, 2.1, title, sharex=True, sharey=True) as panels:
 # distribution and the autoregression are recognised at once, although their spectrum is right: all of their windows are equally loud (*sd
 # of window sds*, and *kurtosis*, which is 3 for a normal distribution). The networks are harder to recognise, but far from the floor.
 #
-# Residual windows *are* real, and the classifier still recognises some. They repeat, which lowers their rank, too. `fit` therefore draws
-# no window twice while others are left.
+# Residual windows *are* real, and the classifier still recognises some. Some occur twice, so it may judge a window whose copy it has
+# learnt; this lowers their rank, too. `fit` therefore draws no window twice while others are left.
 
 # %%
 for name in ("normal distribution", "autoregression"):

@@ -342,7 +342,8 @@ with drawing(alt, height=2.4, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* without a square there is nothing to find, and all three have nearly the same error. The larger the share of the square,
-# the further ridge regression falls behind, and random features stay nearer to the floor than this network.
+# the further ridge regression falls behind, and random features stay nearer to the floor than this network. (One draw of the heater and one
+# seed of the network: differences of a few thousandths mean nothing.)
 #
 # Neither knows any physics. Whoever guesses that heat goes with the square needs no random direction: the second regression gets the
 # *square* of what the first one predicts. From a share of 0.2 on, it comes nearest of all to the floor.
@@ -374,8 +375,8 @@ assert not is_full or rows["ridge regression"][-1] > 1.2 * max(
 # %% [markdown]
 # ## What published runs say
 #
-# The *battery* is a real pair of simulators ([study](../studies/battery/README.md)): in the *gentle* regime at 15 °C, in the *hard* one
-# at −5 °C with larger currents. *Ridge and network* is a small network on what ridge regression leaves.
+# The *battery* is a pair of physical simulators, a simple one and a detailed one ([study](../studies/battery/README.md)): in the *gentle*
+# regime at 15 °C, in the *hard* one at −5 °C with larger currents. *Ridge and network* is a small network on what ridge regression leaves.
 
 # %%
 battery, _ = open_study("battery")
@@ -417,11 +418,12 @@ error_at = {
 check_answer(
     enough,
     lambda number: number == min(each for each in numbers if error_at[each] <= 1.05 * min(error_at.values())),
-    "Look at error_at: from which number on does it hardly fall?",
+    "Fit random features with each number, and compare their errors on new windows.",
 )
 
 # %% [markdown]
-# **2.** The penalty of the untuned ridge regression was 1 in volts. Which penalty does the same regression need in kilovolts?
+# **2.** The penalty of the untuned ridge regression was 1 in volts. Which penalty does the same regression need in kilovolts? (Write the
+# sum that it minimises in both units.)
 
 # %%
 in_kilovolts = None  # your answer

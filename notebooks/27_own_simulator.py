@@ -39,7 +39,7 @@ error = np.sqrt(np.mean((inputs["volts"] - target) ** 2)) / np.std(target)
 with drawing(
     "Voltage of the battery as measured and as simulated, over three hours",
     height=2.2,
-    title=f"The coarse simulator has the timing, but an error of {error:.0%}",
+    title=f"The coarse simulator has the timing, but not the level (error {error:.0%})",
 ) as panel:
     panel.plot(hours, target[:1_200], color=REAL, linewidth=0.8, label="telemetry")
     panel.plot(hours, inputs["volts"][:1_200], color=COARSE, linestyle=DASHED, label="coarse simulator")
@@ -50,7 +50,7 @@ with drawing(
 # *What to see:* both curves rise and fall at the same moments, by different amounts. The battery is charged in the sun and drained in
 # eclipse and by payload passes.
 #
-# ## From cheap to dear
+# ## From simple to complex
 #
 # The cheapest repair is a level and a gain for the voltage. Next comes ridge regression from *all* columns of a window to the telemetry
 # of the window. Both are fitted to the first 60 % of the time and judged on the last 30 %. The gap between them is longer than a window,
@@ -169,8 +169,9 @@ assert not outside[~beside].any()
 
 # %% [markdown]
 # The enhanced run is nearer to the truth than the coarse one also under a fault that training never saw. The trust score warns of this
-# extrapolation before anyone measures. It also marks half of the rest, all of it less than a window away from the fault: a sample gets
-# the mean score of all windows that contain it.
+# extrapolation before anyone measures. It also marks half of the rest, all of it less than a window away from the fault: a sample gets the
+# mean score of all windows that contain it. A warning is no alarm: of the nominal time that `fit` held out, many samples are outside the
+# range, too (the line *range* above).
 #
 # ## A detector that knows what should happen
 #
@@ -303,7 +304,7 @@ from enhsim_tf.coarse_simulator.pairing import estimate_delay  # noqa: F401  for
 
 shifted = telemetry.part(7, len(telemetry))  # telemetry without its first seven samples...
 shifted = type(shifted)(shifted.values, shifted.interval_s, start=telemetry.start)  # ...on the old clock
-delay_s = None  # your answer, with estimate_delay([shifted], simulator, window)
+delay_s = None  # your answer; see help(estimate_delay)
 
 # %%
 check_answer(

@@ -203,8 +203,8 @@ with drawing(alt, 2, 2.4, title) as (left, right):
         panel.minorticks_off()
 
 # %% [markdown]
-# *What to see:* with five windows, the simulator gives fewer false alarms; with more, neither exceeds 1 %. On the right, it always finds
-# somewhat fewer anomalies. Whether such an exchange *pays* needs a rule.
+# *What to see:* with five windows, the simulator gives fewer false alarms; with more, neither exceeds 1 %. On the right, it finds
+# somewhat fewer anomalies in this run. Whether such an exchange *pays* needs a rule.
 
 # %%
 for position, k in enumerate(NUM_REAL):
@@ -294,7 +294,7 @@ shown = {
     "simulator + autoregression": ("simulator, autoregression", AVERAGE, "^"),
 }
 paying = [environment for environment, about in environments.items() if any(about["pays"].values())]
-title = f"A simulator pays on {' and '.join(paying)} noise, and with few windows only"
+title = f"A simulator pays on {' and '.join(paying)} noise, with few windows"
 alt = "Excess of false alarms over the number of real windows on four kinds of noise, for real windows and two simulators"
 with drawing(alt, len(environments), 2.6, title, sharex=True, sharey=True) as panels:
     for panel, (environment, about) in zip(panels, environments.items()):

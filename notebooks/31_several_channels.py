@@ -167,7 +167,7 @@ with drawing(alt, height=1.7, title=title) as panel:
 # %% [markdown]
 # *What to see:* the detector of each channel alone finds little more than its false alarms. Looking at both is not enough: trained on
 # noise without correlation, a detector does not notice that the correlation is gone. Trained on noise drawn jointly, it finds nearly
-# every window. Without a simulator it finds nearly as many: here there is enough telemetry.
+# every window. Without a simulator it finds nearly as many here.
 
 # %%
 for name, (found, alarms) in rates.items():
