@@ -2,7 +2,6 @@
 
 import argparse
 import dataclasses
-import shlex
 import sys
 import time
 import zlib
@@ -133,8 +132,7 @@ def run(options: argparse.Namespace) -> int:
         pipeline = OwnChannel(settings, stages, store, options.telemetry, options.column, options.time)
     chosen = [name for name in FIGURES if options.only in (None, name.split("_")[0])]
     for name in sorted(chosen, key=lambda name: FIGURES[name].needs_training):
-        caption = f"seed {options.seed} · {options.budget} budget · {command_line(options, name)}"
-        save_figure(name, pipeline, folder, caption, options.budget == "smoke")
+        save_figure(name, pipeline, folder, foot_of(options, name), options.budget == "smoke")
     if options.only:
         return 0
 
@@ -144,7 +142,6 @@ def run(options: argparse.Namespace) -> int:
         "seconds": time.perf_counter() - began,
         "stages": stages.seconds,
         "from_cache": [name for name, kept in stages.cached.items() if kept],
-        "command": command_line(options),
     }
     found = results(records, title(records), settings, published, **about)
     write_json(folder / "results.json", found)
@@ -154,15 +151,11 @@ def run(options: argparse.Namespace) -> int:
     return conclude(options, outside(records, published))
 
 
-def command_line(options: argparse.Namespace, figure: str = "") -> str:
-    """The command with the options that change results, for the foot of a figure."""
-    words = [] if options.budget == "full" else ["--budget", options.budget]
-    words += ["--seed", str(options.seed)] if options.seed else []
-    words += [word for text in options.set for word in ("--set", text)]
-    for name in ("telemetry", "column", "time"):
-        words += [f"--{name}", Path(value).name if name == "telemetry" else value] if (value := getattr(options, name)) else []
-    words += ["--store", options.store] if options.store != "parquet" else []
-    return printable(shlex.join([*PROGRAM.split(), *words, *(["--only", figure.split("_")[0]] if figure else [])]))
+def foot_of(options: argparse.Namespace, figure: str) -> str:
+    """The foot of a figure: what this run differs in from others, and the command for this figure."""
+    source = [] if options.telemetry is None else [options.telemetry.name]
+    about = [f"seed {options.seed}", f"{options.budget} budget", *options.set, *source, f"{PROGRAM} --only {figure.split('_')[0]}"]
+    return printable(" · ".join(about))
 
 
 def conclude(options: argparse.Namespace, different: list[str]) -> int:

@@ -79,7 +79,7 @@ def results(
         title: The sign of this run.
         settings: All settings.
         published: Published verdicts.
-        **about: What else is known of the run: `budget`, `seconds`, `stages`, `from_cache`, `command`.
+        **about: What else is known of the run: `budget`, `seconds`, `stages`, `from_cache`.
     """
     return {
         "title": title,

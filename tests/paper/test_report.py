@@ -20,7 +20,7 @@ def found_of(name="the paper's example"):
     """What a run found, with the first claim measured."""
     limits = {limit.name for limit in CLAIMS[0].limits} | {limit.high for limit in CLAIMS[0].limits if isinstance(limit.high, str)}
     records = [judge(claim, dict.fromkeys(limits, 0.0421) if claim is CLAIMS[0] else {}) for claim in CLAIMS]
-    about = {"budget": "full", "seconds": 41.2, "stages": {"enhancer": 30.0}, "from_cache": ["enhancer"], "command": f"run {name}"}
+    about = {"budget": "full", "seconds": 41.2, "stages": {name: 30.0}, "from_cache": [name]}
     return report.results(records, "[¬Re]", Settings(), report.read_published(), **about)
 
 

@@ -65,8 +65,8 @@ print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} 
 
 
 def test_control_characters_reach_neither_caption_nor_results():
-    line = reproduce.command_line(reproduce.parse(["--store", "influxdb://a\x1b[31m\u202e/b\nc/d"]))
-    assert line.isprintable() and "a?[31m?/b?c/d" in line
+    foot = reproduce.foot_of(reproduce.parse(["--telemetry", "a\x1b[31m\u202eb\nc.csv"]), "fig04_enhanced_simulation")
+    assert foot.isprintable() and "a?[31m?b?c.csv" in foot and foot.endswith("--only fig04")
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
