@@ -16,7 +16,7 @@ from enhsim_tf.datasets.label_columns import series_table
 from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_length, parse_place
 from enhsim_tf.detection.anomalies import INJECTIONS, Anomaly, check_kind, draw_begin, estimate_noise_sd, inject_anomalies
 from enhsim_tf.simulator.joint import telemetry_of
-from enhsim_tf.telemetry.pandas_series import to_series
+from enhsim_tf.telemetry.pandas_series import index_of
 from enhsim_tf.telemetry.series import Telemetry
 
 JOINT_KINDS = ("another_time", "delay", "lost_coupling", "common_shift")
@@ -106,7 +106,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.Dat
             f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {parts[0].name}, in which every "
             "second difference is zero. Give the standard deviation with --noise-sd."
         )
-    index = _index_of(parts)
+    index = index_of(parts)
     shortest, longest = length_limits(options.length, interval_s)
     number = (len(options.kinds) if options.number is None else options.number) if options.kinds else 0
     drawn = [
@@ -129,10 +129,6 @@ def _checked_place(text: str) -> Place:
     place = parse_place(text)
     check_kind(place.kind, 1.0 if place.severity is None else place.severity)
     return place
-
-
-def _index_of(parts: Sequence[Telemetry]) -> pd.Index:
-    return pd.concat([to_series(part) for part in parts]).index
 
 
 def join_injected(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -181,7 +177,7 @@ def inject_joint(telemetry: Recording, options: InjectOptions) -> pd.DataFrame:
             values[here, channel] = _changed(nominal, kind, here, channel, bounds, rng)
         found.append((kind, degree, begin, begin + length, "all" if is_common else telemetry.columns[channel]))
     found.sort(key=lambda each: each[2])
-    index = _index_of(telemetry_of(telemetry))
+    index = index_of(telemetry_of(telemetry))
     frame = series_table(values, values != nominal, telemetry.columns, [each[:4] for each in found], index)
     frame.attrs["anomalies"] = found
     return frame

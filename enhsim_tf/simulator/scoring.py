@@ -28,7 +28,7 @@ from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
-from enhsim_tf.telemetry.pandas_series import to_series
+from enhsim_tf.telemetry.pandas_series import index_of
 from enhsim_tf.telemetry.windows import mean_over_windows
 
 _THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; only scores a window apart are independent
@@ -204,7 +204,7 @@ def score(
         names = ("enhanced",) if single else [f"enhanced {name}" for name in simulator.channels]
         columns |= dict(zip(names, enhanced.T, strict=True))
     columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
-    frame = pd.DataFrame(columns, index=pd.concat([to_series(part) for part in telemetry_of(telemetry)]).index)
+    frame = pd.DataFrame(columns, index=index_of(telemetry_of(telemetry)))
     departure, nominal = find_departure(simulator, scorer.score_series, scores, judged), scorer.nominal_scores
     num_alarms, edges = len(events_of(nominal > 1, gap=scorer.window)), np.cumsum([0, *map(len, telemetry.parts)])
     frame.attrs = {

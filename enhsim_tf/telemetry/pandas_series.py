@@ -1,6 +1,7 @@
 """Conversion between telemetry and pandas Series."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import pandas as pd
 
@@ -29,6 +30,11 @@ def to_series(telemetry: Telemetry) -> pd.Series:
     series = pd.Series(telemetry.values, index=index, name=telemetry.name)
     series.attrs["unit"] = telemetry.unit
     return series
+
+
+def index_of(parts: Sequence[Telemetry]) -> pd.Index:
+    """Returns the index that the parts of a series have together, see `to_series`."""
+    return pd.concat([to_series(part) for part in parts]).index
 
 
 def from_series(series: pd.Series, unit: str | None = None) -> Telemetry:
