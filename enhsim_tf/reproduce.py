@@ -154,7 +154,8 @@ def run(options: argparse.Namespace) -> int:
 def foot_of(options: argparse.Namespace, figure: str) -> str:
     """The foot of a figure: what this run differs in from others, and the command for this figure."""
     source = [] if options.telemetry is None else [options.telemetry.name]
-    about = [f"seed {options.seed}", f"{options.budget} budget", *options.set, *source, f"{PROGRAM} --only {figure.split('_')[0]}"]
+    store = [] if options.store == "parquet" else [f"store {options.store}"]
+    about = [f"seed {options.seed}", f"{options.budget} budget", *options.set, *source, *store, f"{PROGRAM} --only {figure.split('_')[0]}"]
     return printable(" · ".join(about))
 
 

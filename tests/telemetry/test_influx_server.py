@@ -366,7 +366,7 @@ def test_the_reproduction_runs_through_influxdb(named, bucket, tmp_path, capsys)
         words = ["--budget", "smoke", "--only", "fig14", "--cache", tmp_path / "cache", "--store", place, "--out", tmp_path / name]
         assert main([str(word) for word in words]) == 0
         assert ("(from the cache)" in capsys.readouterr().out) == (name != "first")
-        assert f"store {place} " in (tmp_path / name / "fig14_telemetry_store.svg").read_text(encoding="utf-8")
+        assert f"store {place} · " in (tmp_path / name / "fig14_telemetry_store.svg").read_text(encoding="utf-8")
         assert [row["_value"] for row in _flux(count)] == [120_000], "they are there, and there once"
     for file in tmp_path.rglob("*"):
         assert not file.is_file() or named.token.encode() not in file.read_bytes()
