@@ -1,7 +1,8 @@
 """What makes training fast: Adam in one operation, Dense layers by blocks, and a convolution with its maximum as one function.
 
-Each gives the numbers of plain Keras up to rounding, and tests compare them; only the masks of dropout are drawn otherwise. Memory bandwidth limits a training step of the paper's
-enhancer (section 2.2) with its 13.7 million weights, and one of its discriminator (section 2.3), so each reads and writes less memory.
+Each gives the numbers of plain Keras up to rounding, and tests compare them; only the masks of dropout are drawn otherwise. Memory
+bandwidth limits a training step of the paper's enhancer (section 2.2) with its 13.7 million weights, and one of its discriminator
+(section 2.3), so each reads and writes less memory.
 """
 
 import math

@@ -94,7 +94,7 @@ def sample(pipeline: Pipeline, part: str, number: int, purpose: str) -> dict[str
 def training_pairs(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Three training windows: above the coarse simulation, a sum of square waves, below the telemetry of the same time."""
     pairs = sample(pipeline, "train", 3, "figure 2")
-    figure, down = new_sheet(DOUBLE, 3.1, "Training source and target of the same times", "Windows begin at random times.")
+    figure, down = new_sheet(DOUBLE, 3.1, "The simulator has the rhythm of the telemetry, not its shape", "Windows begin at random times.")
     axes = panels(figure, down + 0.2, 2, 3, sharex=True, sharey=True)
     begins = pipeline.parts["train"].time[pairs["start"]]
     for column, begin in enumerate(begins):
@@ -110,7 +110,7 @@ def training_pairs(pipeline: Pipeline) -> matplotlib.figure.Figure:
 @paper_figure("fig03_enhancer", "Enhancing MLP neural network")
 def enhancer_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Table of the enhancer's layers with their output shapes and numbers of parameters."""
-    return layer_table(build_enhancer(pipeline.settings), "Layers of the enhancer")
+    return layer_table(build_enhancer(pipeline.settings), "The enhancer is wide and shallow")
 
 
 @paper_figure("fig04_enhanced_simulation", "Enhanced simulation", needs_training=True)
@@ -123,8 +123,8 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.5,
-        "Enhanced simulation of a held-out window",
-        f"Error on all test windows, in standard deviations of the signal: {words}.",
+        "The enhancer turns steps into a waveform",
+        f"A held-out window. Error on all test windows, in standard deviations of the signal: {words}.",
     )
     above, below = panels(figure, down + 0.1, 2, 1, right=0.85, height_ratios=(3, 1), sharex=True)[:, 0]
     above.plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
@@ -201,7 +201,7 @@ def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.0,
-        "Extracted source noise",
+        "The noise is what a moving average leaves of telemetry",
         f"Telemetry minus its {settings.average} moving average over {settings.moving_average} samples. "
         f"Standard deviation of the noise in this window: {np.std(noise):.3f}.",
     )
@@ -218,13 +218,13 @@ def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
 @paper_figure("fig09_generator", "Generator construction")
 def generator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Table of the generator's layers with their output shapes and numbers of parameters."""
-    return layer_table(build_generator(pipeline.settings), "Layers of the generator")
+    return layer_table(build_generator(pipeline.settings), "A latent vector is widened to a window")
 
 
 @paper_figure("fig10_discriminator", "Discriminator construction")
 def discriminator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Table of the discriminator's layers with their output shapes and numbers of parameters."""
-    return layer_table(build_discriminator(pipeline.settings), "Layers of the discriminator")
+    return layer_table(build_discriminator(pipeline.settings), "A window is narrowed to one probability")
 
 
 FIGURES["fig11_gan_training"] = PaperFigure(
@@ -243,7 +243,7 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     history, last = pipeline.history, pipeline.settings.iterations
     chosen = history["iteration"] <= last
     figure, down = new_sheet(
-        DOUBLE, 2.7, "Accuracy and loss for real and generated rows", "Of the discriminator, on rows drawn anew. Dotted: chance."
+        DOUBLE, 2.7, "Accuracy and loss compare the discriminator with chance", "On real and generated rows, drawn anew. Dotted: chance."
     )
     axes = panels(figure, down + 0.2, 1, 2, right=0.8, gap=(0.24, 1.25))[0]
     for panel, key, chance, words in (
@@ -273,8 +273,8 @@ def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.1,
-        "Simulator output, enhanced, with generated noise added",
-        "Standard deviation of first differences: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(*rough),
+        "Generated noise roughens the enhanced signal",
+        "Standard deviation of first differences in this window: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(*rough),
     )
     axes = panels(figure, down + 0.2, 3, 1, sharex=True, sharey=True)
     axes[0, 0].plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
@@ -297,7 +297,7 @@ def stored_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         2.4,
-        "Example telemetry in the store",
+        "All steps read the telemetry from the store",
         f"“{telemetry.name}”: {len(telemetry.values):,} samples, one every {telemetry.interval:g} s; the first {len(shown.values):,}.",
     )
     panel = panels(figure, down + 0.1, 1, 1)[0, 0]

@@ -35,8 +35,8 @@ def read_published() -> dict[str, Any]:
 
 
 def short(value: float) -> str:
-    """A number with three significant digits."""
-    return f"{value:,.0f}" if abs(value) >= 1_000 else f"{value:.3g}"
+    """A number with three significant digits; more if it would be rounded up to 1."""
+    return f"{value:,.0f}" if abs(value) >= 1_000 else f"{value:.5f}" if 0.9995 <= value < 1 else f"{value:.3g}"
 
 
 def needed(limit: Mapping[str, Any]) -> str:
