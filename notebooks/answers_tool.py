@@ -1,0 +1,48 @@
+"""Answers of the exercises of lessons 20 to 31, which their check cells compare with a student's answer."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from enhsim_tf.common import measures
+from enhsim_tf.enhancer.out_of_range import OutOfRange
+from enhsim_tf.paper.pipeline import Pipeline
+
+# -- 26 ----------------------------------------------------------------------------------------------------------------------
+
+
+def enough_features(error_with: Callable[[int], float], numbers: Sequence[int]) -> int:
+    """Lesson 26, exercise 1: the smallest number whose error is at most 5 % above that of the best."""
+    errors = {number: error_with(number) for number in numbers}
+    return min(number for number, error in errors.items() if error <= 1.05 * min(errors.values()))
+
+
+def penalty_in_kilovolts(penalty: float) -> float:
+    """Lesson 26, exercise 2: the penalty is compared with sums of squares, which are smaller by 1,000²."""
+    return penalty / 1_000**2
+
+
+# -- 21 ----------------------------------------------------------------------------------------------------------------------
+
+
+def fall_of_the_rank(windows: np.ndarray, number: int) -> float:
+    """Lesson 21, exercise 1: the effective rank of the first windows, divided by that of all."""
+    return measures.effective_rank(windows[:number]) / measures.effective_rank(windows)
+
+
+# -- 23 ----------------------------------------------------------------------------------------------------------------------
+
+
+def least_flagged(scores: dict[str, np.ndarray], limit: float) -> list[str]:
+    """Lesson 23, exercise 1: the modes of which the fewest windows exceed the limit."""
+    shares = {mode: np.mean(values > limit) for mode, values in scores.items()}
+    return [mode for mode, share in shares.items() if share == min(shares.values())]
+
+
+def error_ratio(
+    score: OutOfRange, limit: float, pipeline: Pipeline, coarse: np.ndarray, truth: np.ndarray
+) -> float:
+    """Lesson 23, exercise 2: the median error of windows above the limit, divided by that of the others."""
+    errors = np.sqrt(np.mean((pipeline.enhance(coarse) - truth) ** 2, axis=1))
+    above = score.score(coarse) > limit
+    return float(np.median(errors[above]) / np.median(errors[~above]))
