@@ -4,9 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from enhsim_tf.coarse_simulator.pairing import estimate_delay
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common import measures
+from enhsim_tf.detection.metrics import finite_threshold
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.paper.pipeline import Pipeline
+from enhsim_tf.telemetry.series import Telemetry
 
 # -- 26 ----------------------------------------------------------------------------------------------------------------------
 
@@ -46,3 +50,27 @@ def error_ratio(
     errors = np.sqrt(np.mean((pipeline.enhance(coarse) - truth) ** 2, axis=1))
     above = score.score(coarse) > limit
     return float(np.median(errors[above]) / np.median(errors[~above]))
+
+
+# -- 27 ----------------------------------------------------------------------------------------------------------------------
+
+
+def delay_s(telemetry: Telemetry, simulator: Recording, window: int) -> float:
+    """Lesson 27, exercise 1: the delay of the simulator against the telemetry in seconds."""
+    return estimate_delay([telemetry], simulator, window).seconds
+
+
+def ratio_without_temperature(error_with: Callable[[list[str]], float]) -> float:
+    """Lesson 27, exercise 2: the error without the temperature, divided by that with it."""
+    return error_with(["volts", "amperes"]) / error_with(["volts", "amperes", "celsius"])
+
+
+# -- 22 ----------------------------------------------------------------------------------------------------------------------
+
+
+def repaired_threshold(detector: tuple[np.ndarray, np.ndarray], windows: np.ndarray) -> float:
+    """Lesson 22, exercise 1: the conformal threshold for 1 % from the scores of the given windows."""
+    centre, directions = detector
+    centred = windows - centre
+    scores = np.mean((centred - centred @ directions @ directions.T) ** 2, axis=1)
+    return finite_threshold(scores, 0.01)[0]
