@@ -74,3 +74,17 @@ def repaired_threshold(detector: tuple[np.ndarray, np.ndarray], windows: np.ndar
     centred = windows - centre
     scores = np.mean((centred - centred @ directions @ directions.T) ** 2, axis=1)
     return finite_threshold(scores, 0.01)[0]
+
+
+# -- 29 ----------------------------------------------------------------------------------------------------------------------
+
+
+def num_different_windows(pipeline: Pipeline, window: int) -> int:
+    """Lesson 29, exercise 1: how many different windows of the simulator a long run contains."""
+    series = pipeline.simulator(np.arange(2_000.0)).ravel()
+    return len({each.tobytes() for each in np.lib.stride_tricks.sliding_window_view(series, window)})
+
+
+def num_parameters(pipeline: Pipeline) -> int:
+    """Lesson 29, exercise 2: the number of parameters of the enhancer."""
+    return pipeline.enhancer.count_params()
