@@ -5,10 +5,11 @@
 #
 # - **After this lesson** you have trained both networks of the paper, have tested a detector on their output, and know what a small run
 #   can show.
-# - **You should know** the tour (notebook 00) and the PCA residual (notebook 13).
+# - **You should know** the tour (notebook 00).
 # - **Terms:** [window](../docs/glossary.md#window), [NRMSE](../docs/glossary.md#nrmse), [ridge
 #   regression](../docs/glossary.md#ridge-regression): one matrix instead of a network; [effective
-#   rank](../docs/glossary.md#effective-rank), [false-alarm rate](../docs/glossary.md#false-alarm-rate).
+#   rank](../docs/glossary.md#effective-rank), [false-alarm rate](../docs/glossary.md#false-alarm-rate); [PCA
+#   residual](../docs/glossary.md#pca-residual): what the main directions of the training windows leave of a window.
 #
 # **What the paper says** (section 2): windows of 500 samples, hidden layers of 3,200 neurons, 40 epochs and about 1,000 iterations. Here
 # everything is smaller. The same code runs, and nothing is taken from a cache.
@@ -89,7 +90,7 @@ assert rough["enhanced"] < 0.6 * rough["real"] and abs(rough["with noise"] / rou
 # %% [markdown]
 # ## Test a detector
 #
-# Train the PCA residual (notebook 13) on each kind of windows, set its threshold for 1 % of further windows of the same kind, and count
+# Train the PCA residual on each kind of windows, set its threshold for 1 % of further windows of the same kind, and count
 # alarms on real nominal windows.
 
 # %%

@@ -12,21 +12,7 @@ from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.telemetry.series import Telemetry
 
-# -- 26 ----------------------------------------------------------------------------------------------------------------------
-
-
-def enough_features(error_with: Callable[[int], float], numbers: Sequence[int]) -> int:
-    """Lesson 26, exercise 1: the smallest number whose error is at most 5 % above that of the best."""
-    errors = {number: error_with(number) for number in numbers}
-    return min(number for number, error in errors.items() if error <= 1.05 * min(errors.values()))
-
-
-def penalty_in_kilovolts(penalty: float) -> float:
-    """Lesson 26, exercise 2: the penalty is compared with sums of squares, which are smaller by 1,000²."""
-    return penalty / 1_000**2
-
-
-# -- 21 ----------------------------------------------------------------------------------------------------------------------
+# -- 21 ------------------------------------------------------------------------------------------------------
 
 
 def fall_of_the_rank(windows: np.ndarray, number: int) -> float:
@@ -34,7 +20,18 @@ def fall_of_the_rank(windows: np.ndarray, number: int) -> float:
     return measures.effective_rank(windows[:number]) / measures.effective_rank(windows)
 
 
-# -- 23 ----------------------------------------------------------------------------------------------------------------------
+# -- 22 ------------------------------------------------------------------------------------------------------
+
+
+def repaired_threshold(detector: tuple[np.ndarray, np.ndarray], windows: np.ndarray) -> float:
+    """Lesson 22, exercise 1: the conformal threshold for 1 % from the scores of the given windows."""
+    centre, directions = detector
+    centred = windows - centre
+    scores = np.mean((centred - centred @ directions @ directions.T) ** 2, axis=1)
+    return finite_threshold(scores, 0.01)[0]
+
+
+# -- 23 ------------------------------------------------------------------------------------------------------
 
 
 def least_flagged(scores: dict[str, np.ndarray], limit: float) -> list[str]:
@@ -52,7 +49,21 @@ def error_ratio(
     return float(np.median(errors[above]) / np.median(errors[~above]))
 
 
-# -- 27 ----------------------------------------------------------------------------------------------------------------------
+# -- 26 ------------------------------------------------------------------------------------------------------
+
+
+def enough_features(error_with: Callable[[int], float], numbers: Sequence[int]) -> int:
+    """Lesson 26, exercise 1: the smallest number whose error is at most 5 % above that of the best."""
+    errors = {number: error_with(number) for number in numbers}
+    return min(number for number, error in errors.items() if error <= 1.05 * min(errors.values()))
+
+
+def penalty_in_kilovolts(penalty: float) -> float:
+    """Lesson 26, exercise 2: the penalty is compared with sums of squares, which are smaller by 1,000²."""
+    return penalty / 1_000**2
+
+
+# -- 27 ------------------------------------------------------------------------------------------------------
 
 
 def delay_s(telemetry: Telemetry, simulator: Recording, window: int) -> float:
@@ -65,18 +76,7 @@ def ratio_without_temperature(error_with: Callable[[list[str]], float]) -> float
     return error_with(["volts", "amperes"]) / error_with(["volts", "amperes", "celsius"])
 
 
-# -- 22 ----------------------------------------------------------------------------------------------------------------------
-
-
-def repaired_threshold(detector: tuple[np.ndarray, np.ndarray], windows: np.ndarray) -> float:
-    """Lesson 22, exercise 1: the conformal threshold for 1 % from the scores of the given windows."""
-    centre, directions = detector
-    centred = windows - centre
-    scores = np.mean((centred - centred @ directions @ directions.T) ** 2, axis=1)
-    return finite_threshold(scores, 0.01)[0]
-
-
-# -- 29 ----------------------------------------------------------------------------------------------------------------------
+# -- 29 ------------------------------------------------------------------------------------------------------
 
 
 def num_different_windows(pipeline: Pipeline, window: int) -> int:
