@@ -38,7 +38,11 @@ noises = {
     "GAN": pipeline.generate_noise(len(real), np.random.default_rng(1)),
     "Gaussian": gaussian,
 }
-looks = {"real": (REAL, "-"), "GAN": (GENERATED, DASHED), "Gaussian": (QUIET, ":")}
+looks = {
+    "real": {"color": REAL},
+    "GAN": {"color": GENERATED, "linestyle": DASHED},
+    "Gaussian": {"color": QUIET, "linestyle": ":"},
+}
 show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
@@ -62,14 +66,12 @@ spectrum = {name: power(windows) for name, windows in noises.items()}
 # %%
 alt = "Histogram of the values and mean power spectrum of real, GAN and Gaussian noise"
 title = "Values nearly agree; only real noise has a peak at two minutes"
-edges = np.linspace(-0.4, 0.4, 81)
 with drawing(alt, 2, 2.5, title) as (left, right):
     for name, windows in noises.items():
-        color, style = looks[name]
         left.hist(
-            windows.ravel(), edges, density=True, histtype="step", color=color, linestyle=style, label=name
+            windows.ravel(), 80, range=(-0.4, 0.4), density=True, histtype="step", label=name, **looks[name]
         )
-        right.plot(frequency, spectrum[name], color=color, linestyle=style, linewidth=0.8)
+        right.plot(frequency, spectrum[name], linewidth=0.8, **looks[name])
     left.set(xlabel="noise (dimensionless)", ylabel="density")
     right.set(xlabel="frequency (Hz)", ylabel="power (dimensionless)", xscale="log", yscale="log")
     left.legend(frameon=False)
@@ -126,15 +128,15 @@ print(pd.DataFrame(rows).T.round(3).to_string())
 # Real noise does not know where a window was cut: average a thousand windows sample by sample, and nearly nothing is left.
 
 # %%
-alt = "Mean over all windows, sample by sample, of real and of GAN noise"
 fixed = {
     name: np.mean(windows.mean(axis=0) ** 2) / np.mean(windows.astype(float) ** 2)
     for name, windows in noises.items()
 }
+alt = "Mean over all windows, sample by sample, of real and of GAN noise"
 title = f"{fixed['GAN']:.0%} of the power of the GAN's noise is one fixed pattern"
 with drawing(alt, height=1.9, title=title) as panel:
     for name in ("GAN", "real"):
-        panel.plot(noises[name].mean(axis=0), color=looks[name][0], linewidth=0.8, label=name)
+        panel.plot(noises[name].mean(axis=0), color=looks[name]["color"], linewidth=0.8, label=name)
     panel.set(xlabel="time in the window (s)", ylabel="mean over windows")
     panel.margins(y=0.3)
     panel.legend(frameon=False, ncols=2, loc="upper right")
@@ -156,36 +158,22 @@ assert fixed["GAN"] > 5 * fixed["real"] and alike > 0.5
 # ## How the windows differ from each other
 #
 # Subtract that pattern, and consider windows as points in 500 dimensions. In how many of them do they vary? The singular values of the
-# windows say which share of the variance lies in the largest directions.
+# windows say which share of the variance lies in the largest directions. The effective rank (notebook 09) is one number for it.
 
 # %%
-gathered = {}
+shares = {}
 for name, windows in noises.items():
     energy = np.linalg.svd(windows - windows.mean(axis=0), compute_uv=False) ** 2
-    gathered[name] = np.cumsum(energy) / energy.sum()
-alt = "Share of the variance that the largest directions hold, of real, GAN and Gaussian noise"
-title = f"Twenty directions hold {gathered['GAN'][19]:.0%} of the GAN's variance, {gathered['real'][19]:.0%} of the real"
-with drawing(alt, height=2.3, title=title) as panel:
-    for name, values in gathered.items():
-        color, style = looks[name]
-        panel.plot(np.arange(1, len(values) + 1), values, color=color, linestyle=style, label=name)
-    panel.axvline(20, color=QUIET, linewidth=0.5)
-    panel.set(
-        xlabel="number of directions, the largest first", ylabel="share of the variance", ylim=(0, 1.02)
-    )
-    panel.legend(frameon=False)
-
-# %% [markdown]
-# *What to see:* few directions hold the GAN's variance; real noise needs hundreds. The GAN's windows lie near a thin sheet in 500
-# dimensions.
-
-# %%
+    shares[name] = round(float(energy[:20].sum() / energy.sum()), 2)
+print("share of the variance in twenty directions:", shares)
 rank = {name: measures.effective_rank(windows) for name, windows in noises.items()}
 print("effective rank:", {name: round(value) for name, value in rank.items()})
 assert rank["GAN"] < {True: 0.2, False: 0.6}[is_full] * rank["real"]  # few windows have little rank to lose
 assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
 
 # %% [markdown]
+# Few directions hold the GAN's variance; real noise needs hundreds. The GAN's windows lie near a thin sheet in 500 dimensions.
+#
 # ## What a detector makes of it
 #
 # Train the PCA residual of notebook 13 on enhanced windows with the GAN's noise. Its twenty components hold the waveform and most of the
@@ -218,13 +206,10 @@ alarms = {name: float(np.mean(of_real > limit)) for name, (_, of_real, limit) in
 
 # %%
 alt = "Scores of windows like those trained on and of real ones, for GAN noise and for Gaussian noise"
-title = (
-    f"False alarms: {alarms['GAN']:.0%} with the GAN's noise, {alarms['Gaussian']:.1%} with Gaussian noise"
-)
+title = f"False alarms: {alarms['GAN']:.0%} with GAN noise, {alarms['Gaussian']:.1%} with Gaussian noise"
 with drawing(alt, 2, 2.4, title, sharex=True, sharey=True) as panels:
     for panel, (name, (own, of_real, limit)) in zip(panels, results.items()):
-        color = looks[name][0]
-        panel.hist(np.log10(own), 40, color=color, alpha=0.5, label=f"enhanced + {name} noise")
+        panel.hist(np.log10(own), 40, color=looks[name]["color"], alpha=0.5, label=f"enhanced + {name} noise")
         panel.hist(np.log10(of_real), 40, histtype="step", color=REAL, label="real nominal")
         panel.axvline(np.log10(limit), color=REAL, linestyle=DASHED, label="threshold")
         panel.set(title=f"trained on enhanced + {name} noise", xlabel="score, log10", ylabel="windows")

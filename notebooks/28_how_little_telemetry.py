@@ -134,7 +134,7 @@ def curve(panel, values, label, color, style, marker):
     panel.margins(x=0.05)
 
 
-title = f"With {NUM_REAL[0]} windows, cross-fitting lowers false alarms from {rates.iloc[0, 0]:.0%} to {rates.iloc[0, 1]:.1%}"
+title = f"With {NUM_REAL[0]} windows, cross-fitting lowers false alarms from {rates.iloc[0, 0]:.0%} to {rates.iloc[0, 1]:.0%}"
 alt = "False alarms over the number of real windows, for two ways to set the threshold on the same windows"
 with drawing(alt, height=2.1, title=title) as panel:
     for (name, values), look in zip(rates.items(), ((QUIET, DASHED, "s"), (REAL, "-", "o"))):
@@ -150,9 +150,10 @@ with drawing(alt, height=2.1, title=title) as panel:
 # windows, and of no others. Cross-fitting comes much nearer to the 1 % that was asked for, but with five windows it is still above it.
 
 # %%
-print(rates.rename_axis("k").round(3).to_string())
-assert (rates["threshold from the training windows"] > 5 * rates["threshold by cross-fitting"]).all()
-assert rates["threshold by cross-fitting"].iloc[0] > 0.01
+print(rates.rename_axis("k").round(4).to_string())
+if is_full:
+    assert (rates["threshold from the training windows"] > 5 * rates["threshold by cross-fitting"]).all()
+    assert rates["threshold by cross-fitting"].iloc[0] > 0.01
 
 # %% [markdown]
 # ## A simulator that is fitted to the same windows
@@ -212,7 +213,7 @@ table = pd.DataFrame(results).T.groupby(level=1).mean()  # over the draws
 # %%
 alt = "False alarms and recall of both arms over the number of real windows"
 first = table["false alarms"].iloc[0]
-title = f"With {NUM_REAL[0]} windows, false alarms are {first.iloc[0]:.1%} alone, {first.iloc[1]:.1%} with the simulator"
+title = f"With {NUM_REAL[0]} windows, false alarms are {first.iloc[0]:.0%} alone, {first.iloc[1]:.0%} with the simulator"
 with drawing(alt, 2, 2.4, title) as (left, right):
     for name, look in zip(first.index, ((REAL, "-", "o"), (AVERAGE, DASHED, "^"))):
         curve(left, table["false alarms", name], name, *look)
@@ -227,7 +228,7 @@ with drawing(alt, 2, 2.4, title) as (left, right):
 # fewer anomalies, and the difference is largest with five windows. Whether such an exchange *pays* needs a rule.
 
 # %%
-print(table.rename_axis("k").round(3).to_string())
+print(table.rename_axis("k").round(4).to_string())
 lost = table["recall", "real windows alone"] - table["recall", "simulator fitted to them"]
 if is_full:
     assert (
@@ -255,7 +256,7 @@ def pays(real_alarms, own_alarms, recall_loss):
 
 for k in NUM_REAL:
     answer = "pays" if pays(*table.loc[k, "false alarms"], lost[k]) else "does not pay"
-    print(f"k = {k}: recall lower by {lost[k]:.1%}; the simulator {answer}")
+    print(f"k = {k}: recall lower by {100 * lost[k]:.1f} points; the simulator {answer}")
 
 # %%
 found, _ = open_study("few_windows")
