@@ -229,8 +229,8 @@ assert not is_full or shot_alarms["Gaussian"] > 0.1 > 0.03 > shot_alarms["noise 
 # ## All of it at once
 #
 # A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, with five seeds. It has no Gaussian noise,
-# which does well here because the real noise is Gaussian. Its arm *enhanced* has no noise at all. The *only* in its title is among these
-# six arms.
+# which does well here because the real noise is Gaussian. Its arm *enhanced* has no noise at all. What its title says holds among its six
+# arms.
 #
 # ![False alarms by training data](../studies/robustness/results/false_alarms.png)
 
