@@ -11,19 +11,18 @@
 #
 # **What the paper says** (section 2.3): after the discriminator's turn its "weights are frozen, and the generator is trained as part of
 # the entire GAN model". The paper ran on TensorFlow 2.1, and so did the classic way to write that sentence down: compile the
-# discriminator, set `trainable = False`, compile the stack. Many tutorials have it. Under Keras 3 it does not train the discriminator,
-# and hardly says so.
+# discriminator, set `trainable = False`, compile the *stack*, which is the generator and the discriminator in one model. Many tutorials
+# have it. Under Keras 3 it does not train the discriminator, and hardly says so.
 
 # %%
 import warnings
 
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show
+from lesson_tools import check_answer, drawing, open_pipeline, show
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
 
 pipeline, budget = open_pipeline()
-claim("C5")
 
 # %%
 import keras
@@ -76,28 +75,27 @@ generator, discriminator = small_pair()
 
 discriminator.compile("adam", "binary_crossentropy")
 discriminator.trainable = False  # meant for the stack below
-combined = keras.Sequential([generator, discriminator])
-combined.compile("adam", "binary_crossentropy")
+stack = keras.Sequential([generator, discriminator])
+stack.compile("adam", "binary_crossentropy")
 
 # %% [markdown]
-# The loop of the tutorials. The losses are computed separately, because the numbers that `train_on_batch` returns in Keras 3 are running
-# means over all its calls.
+# The loop of the tutorials. The losses are computed separately, before each update.
 
 # %%
-rng, real_tags, generated_tags = np.random.default_rng(0), np.ones((64, 1)), np.zeros((64, 1))
+rng, real_labels, generated_labels = np.random.default_rng(0), np.ones((64, 1)), np.zeros((64, 1))
 loss, start, classic_losses = keras.losses.BinaryCrossentropy(), discriminator.get_weights(), []
 with warnings.catch_warnings(record=True) as heard:
     warnings.simplefilter("always")
     for _ in range(60):
         latent = rng.standard_normal((64, 16))
         batches = (
-            (rng.choice(real_noise, 64), real_tags),
-            (generator.predict_on_batch(latent), generated_tags),
+            (rng.choice(real_noise, 64), real_labels),
+            (generator.predict_on_batch(latent), generated_labels),
         )
-        classic_losses.append([float(loss(tags, discriminator(rows))) for rows, tags in batches])
-        for rows, tags in batches:
-            discriminator.train_on_batch(rows, tags)
-        combined.train_on_batch(latent, real_tags)  # tags reversed
+        classic_losses.append([float(loss(labels, discriminator(rows))) for rows, labels in batches])
+        for rows, labels in batches:
+            discriminator.train_on_batch(rows, labels)
+        stack.train_on_batch(latent, real_labels)  # labels reversed
 
 # %% [markdown]
 # The loop ran to its end without an error and returned losses that move. Did the discriminator?
@@ -123,10 +121,24 @@ assert [warning.category for warning in heard] == [UserWarning]
 # | Keras 3 | when the training step is first built, after the freeze | trains none |
 
 # %%
-models = {"discriminator": discriminator, "stack": combined, "generator": generator}
+models = {"discriminator": discriminator, "stack": stack, "generator": generator}
 trainable = {name: len(model.trainable_weights) for name, model in models.items()}
 print("trainable weights:", trainable)
 assert trainable["discriminator"] == 0 and trainable["stack"] == trainable["generator"]
+
+# %% [markdown]
+# If the table is right, a discriminator that is frozen while `compile` runs, and is free again when the step is built, learns:
+
+# %%
+_, other = small_pair()
+other.trainable = False
+other.compile("adam", "binary_crossentropy")
+other.trainable = True
+before = other.get_weights()
+other.train_on_batch(real_noise[:64], real_labels)
+learns = [bool((now != old).any()) for now, old in zip(other.get_weights(), before)]
+print("weights that moved:", learns)
+assert all(learns)
 
 # %% [markdown]
 # ## The right way
@@ -149,13 +161,16 @@ def update(optimizer, weights, error):
 rng, named_losses = np.random.default_rng(0), []
 for _ in range(60):
     latent = rng.standard_normal((64, 16), "float32")
-    batches = (rng.choice(real_noise, 64), real_tags), (generator(latent), generated_tags)
+    batches = (rng.choice(real_noise, 64), real_labels), (generator(latent), generated_labels)
     weights = discriminator.trainable_variables
     named_losses.append(
-        [update(optimizers[0], weights, lambda: loss(tags, discriminator(rows))) for rows, tags in batches]
+        [
+            update(optimizers[0], weights, lambda: loss(labels, discriminator(rows)))
+            for rows, labels in batches
+        ]
     )
     weights = generator.trainable_variables
-    update(optimizers[1], weights, lambda: loss(real_tags, discriminator(generator(latent, training=True))))
+    update(optimizers[1], weights, lambda: loss(real_labels, discriminator(generator(latent, training=True))))
 
 rightly_moved = [float(np.abs(now - before).max()) for now, before in zip(discriminator.get_weights(), start)]
 print("largest change of each of its weights:", np.round(rightly_moved, 3))
@@ -176,22 +191,22 @@ with drawing(alt, 2, 2.4, title, sharey=True) as panels:
     for panel, (name, curves) in zip(panels, losses.items()):
         panel.plot(curves[:, 0], color=REAL, label="real noise")
         panel.plot(curves[:, 1], color=GENERATED, linestyle=DASHED, label="generated noise")
-        panel.set(title=name, xlabel="iteration", ylabel="cross-entropy of the discriminator", ylim=(0, None))
+        panel.set(title=name, xlabel="iteration", ylim=(0, None))
         panel.legend(frameon=False)
+    panels[0].set_ylabel("cross-entropy")
 
 # %% [markdown]
 # *What to see:* in both panels the loss on generated noise moves, which looks like training. On the left it rises, and the loss on real
 # noise stands still: only the generator learns. On the right the discriminator learns to recognise generated noise within some twenty
-# steps, while its loss on real noise rises at first.
+# steps, while its loss on real noise rises at first. (The first losses differ, because the right-hand loop updates on the real noise before
+# it computes the loss on generated noise.)
 
 # %%
 (classic_first, classic_last), (named_first, named_last) = (
     np.array(curves)[[0, -1], 1] for curves in losses.values()
 )
-say(
-    f"Loss on generated noise, first and last: **{classic_first:.2f} → {classic_last:.2f}** with the classic pattern, "
-    f"**{named_first:.2f} → {named_last:.2f}** with named weights."
-)
+print(f"loss on generated noise, first and last: classic pattern {classic_first:.2f}, {classic_last:.2f}")
+print(f"named weights {named_first:.2f}, {named_last:.2f}")
 assert classic_last > classic_first and named_last < named_first / 2
 
 # %% [markdown]
@@ -216,7 +231,7 @@ def rescued_pattern():
 # %%
 judge, was = rescued_pattern(), small_pair()[1].get_weights()
 with warnings.catch_warnings(action="ignore"):  # the warning that we know
-    judge.train_on_batch(real_noise[:64], real_tags)
+    judge.train_on_batch(real_noise[:64], real_labels)
 changed = [bool((now != before).any()) for now, before in zip(judge.get_weights(), was)]
 check_answer(
     changed if any(changed) else None,
@@ -238,7 +253,7 @@ def honest():
     update(
         optimizers[0],
         discriminator.trainable_variables,
-        lambda: loss(real_tags, discriminator(real_noise[:64])),
+        lambda: loss(real_labels, discriminator(real_noise[:64])),
     )
 
 
@@ -268,7 +283,7 @@ check_answer(
 # def rescued_pattern():
 #     _, judge = small_pair()
 #     judge.compile("adam", "binary_crossentropy")
-#     judge.train_on_batch(real_noise[:64], real_tags)  # builds the step while all is trainable
+#     judge.train_on_batch(real_noise[:64], real_labels)  # builds the step while all is trainable
 #     judge.trainable = False
 #     return judge
 #
@@ -276,7 +291,7 @@ check_answer(
 # judge = rescued_pattern()
 # before = judge.get_weights()
 # with warnings.catch_warnings(action="ignore"):
-#     judge.train_on_batch(real_noise[:32], real_tags[:32])  # a new batch shape: the step is built anew
+#     judge.train_on_batch(real_noise[:32], real_labels[:32])  # a new batch shape: the step is built anew
 # print("moved by a batch of another size:", [bool((now != old).any()) for now, old in zip(judge.get_weights(), before)])
 # ```
 #

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # False alarms
 #
-# **Question:** a detector is trained on a simulation. What decides how often it raises a false alarm on real telemetry?
+# **Question:** a detector is trained on a simulation. Which property of the training windows decides how often it raises a false alarm?
 #
 # - **After this lesson** you can say how the training noise sets the threshold, and repair a threshold with a few real windows.
 # - **You should know** the PCA residual and the threshold of notebook 13, and ridge regression (notebook 04).
@@ -16,7 +16,7 @@
 import numpy as np
 from lesson_tools import check_answer, claim, drawing, open_pipeline, open_study, verdict
 
-from enhsim_tf.common.plot_style import AVERAGE, ENHANCED, QUIET, REAL
+from enhsim_tf.common.plot_style import ENHANCED, QUIET, REAL
 
 pipeline, budget = open_pipeline()
 is_full = budget == "full"
@@ -158,7 +158,7 @@ if is_full:
 
 # %% [markdown]
 # A simulator without noise, however perfect, sets the threshold at nearly nothing. The paper's noise has the right standard deviation,
-# but few directions (notebook 09): the detector learns them, and its threshold describes what is left. Gaussian noise and residual
+# but few directions (notebook 21): the detector learns them, and its threshold describes what is left. Gaussian noise and residual
 # windows leave as much as real noise does.
 #
 # ## The scale of the noise
@@ -177,17 +177,18 @@ for factor in factors:
 
 title = "A few per cent in the noise's scale decide the false alarms"
 with drawing("False alarms over the scale of the training noise", height=2.0, title=title) as panel:
-    panel.plot(factors, [100 * rate for rate in by_factor.values()], "o-", color=AVERAGE, markersize=4)
-    panel.axhline(1, color=QUIET, linewidth=0.8)
-    panel.set(xlabel="factor of the noise's standard deviation", ylabel="false alarms (%), set for 1 %")
+    panel.plot(factors, [100 * rate for rate in by_factor.values()], "o-", color=REAL, markersize=4)
+    panel.axhline(1, color=QUIET, linestyle=":", label="set for 1 %")
+    panel.set(xlabel="factor of the noise's standard deviation", ylabel="false alarms (%)")
+    panel.margins(x=0.03)
+    panel.legend(frameon=False)
 
 # %% [markdown]
 # *What to see:* the curve falls from everything to nothing between 0.8 and 1.05. Each score is a mean over 500 samples, so the scores of
 # nominal windows differ little from each other, and a small error of the scale moves the threshold past most of them.
 
 # %%
-for factor, rate in by_factor.items():
-    print(f"factor {factor:4}: false alarms {rate:6.1%}")
+print("false alarms by factor:", {factor: f"{rate:.1%}" for factor, rate in by_factor.items()})
 if is_full:
     assert by_factor[0.8] > 0.9 and by_factor[0.95] > 0.03 and by_factor[1.1] < 0.005
 
@@ -225,45 +226,11 @@ assert not is_full or shot_alarms["Gaussian"] > 0.1 > 0.03 > shot_alarms["noise 
 # It is not enough: with the same standard deviation, Gaussian noise sets a threshold that is too low for shot noise. Noise drawn from
 # real windows sets the right one.
 #
-# ## Few false alarms are not the aim
-#
-# The arm *coarse* raises no false alarm. Does it find anomalies? Add a *ramp* to each test window: within 100 samples, the value drifts
-# off by two standard deviations of the noise. And give another detector the same arms, the *limit check* of every ground station. Its
-# score is how far a window leaves the range of the training values (quantiles 0.1 % and 99.9 %).
-
-
-# %%
-from enhsim_tf.detection.anomalies import inject
-from enhsim_tf.detection.detectors import LimitCheck
-
-ramps = inject(healthy, "ramp", 2.0, 100, sd, np.random.default_rng(5))[0]
-
-
-def limit_check(training, windows):
-    low, high = np.quantile(training, [0.001, 0.999])
-    return np.maximum(low - windows.min(axis=1), windows.max(axis=1) - high)
-
-
-np.testing.assert_allclose(limit_check(real, healthy), LimitCheck().fit(real).score(healthy))
-found, limits = {}, {}
-print(f"{'':26}{'PCA residual':^26}{'limit check':>14}")
-print(f"{'':26}{'false alarms':>13}{'ramps found':>13}{'false alarms':>14}")
-for name, (training, held_out) in arms.items():
-    found[name] = np.mean(scores_of(detectors[name], ramps) > threshold[name])
-    limits[name] = np.mean(limit_check(training, healthy) > threshold_for(limit_check(training, held_out)))
-    print(f"{name:26}{alarms[name]:13.1%}{found[name]:13.0%}{limits[name]:14.1%}")
-assert found["truth"] == 1 and limits["coarse"] > 0.9
-assert not is_full or (found["coarse"] < 0.02 and limits["enhanced + GAN"] < 0.05)
-
-# %% [markdown]
-# It does not: *coarse* finds no ramp. The limit check judges the arms otherwise. Square waves never leave their levels, and real noise
-# always does: the coarse arm alarms on every window. With the GAN's noise, whose values are nearly right (notebook 21), it hardly alarms.
-# So the false alarms of one detector say little about a simulation.
-#
 # ## All of it at once
 #
 # A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, with five seeds. It has no Gaussian noise,
-# which does well here because the real noise is Gaussian.
+# which does well here because the real noise is Gaussian. Its arm *enhanced* has no noise at all. What its title says holds among its six
+# arms.
 #
 # ![False alarms by training data](../studies/robustness/results/false_alarms.png)
 
@@ -290,39 +257,34 @@ for about in published["arms"]["ridge + residual windows"]["by_environment"].val
 #
 # C8 is judged with three detectors. The first is that of this lesson. An *isolation forest* describes a window by 14 numbers, such as its
 # standard deviation, and finds those that few random cuts separate from the rest. A *dense autoencoder* is a network that presses a window
-# through a layer of 16 units and scores what it cannot restore.
+# through a layer of 16 units and scores what it cannot restore. Each is trained on the enhanced signal with the GAN's noise. It counts *as
+# good as if trained on telemetry* if its false alarms are at most twice those after training on real windows plus one point, and its recall
+# is at most five points lower. C8 holds in part if half of the detectors are as good, and fully if all are.
 
 # %%
 _ = verdict(pipeline, "C8")
 
 # %% [markdown]
-# **Answer.** The noise of the training windows, and the detector. For the PCA residual, the scale of the noise must be right to a few per
-# cent, and noise of few directions or of another kind sets a wrong threshold even then. Noise drawn from real noise or residuals set a
-# right one in each case tried here; but its detector found fewer ramps than the one that was trained on real windows.
+# **Answer.** Their noise. For the PCA residual, its scale must be right to a few per cent, and noise of few directions or of another kind
+# sets a wrong threshold even then. Noise drawn from real noise or residuals set a right one in each case tried here. (How many faults a
+# detector finds is another matter: with no false alarm at all, it may find none.)
 #
 # ## Exercises
 #
 # **1.** The detector of *truth* alarms on everything. Somebody gives you 300 real nominal windows (at smoke budget, fewer). Repair it
-# without training it again: return its false-alarm rate on `healthy` and its recall, the share of `ramps` that it finds.
+# without training it again: which threshold do you give it?
 
 # %%
 few = calibration[:300]
-
-
-def repaired():
-    # your code
-    return None
-
+new_threshold = None  # your answer
 
 # %%
-at_rate = np.quantile(
-    of_healthy["truth"], [0.97, 1.0]
-)  # a right limit leaves less than 3 % of the windows above it
-recalls = [np.mean(scores_of(detectors["truth"], ramps) > limit) for limit in at_rate]
+from notebooks import answers_tool
+
 check_answer(
-    repaired(),
-    lambda answer: not is_full or (answer[0] < 0.03 and recalls[1] <= answer[1] <= recalls[0]),
-    "The detector stays. Which windows should set its threshold?",
+    new_threshold,
+    lambda answer: np.isclose(answer, answers_tool.repaired_threshold(detectors["truth"], few)),
+    "The detector stays. Which windows should set its threshold, and at which rank of their scores?",
 )
 
 # %% [markdown]
@@ -345,12 +307,8 @@ check_answer(
 # <details><summary>1. A few real windows</summary>
 #
 # ```python
-# def repaired():
-#     limit = threshold_for(scores_of(detectors["truth"], few))
-#     return np.mean(scores_of(detectors["truth"], healthy) > limit), np.mean(scores_of(detectors["truth"], ramps) > limit)
-#
-#
-# print("false alarms {:.1%}, recall {:.0%}; trained on real windows {:.0%}".format(*repaired(), found["real"]))
+# new_threshold = threshold_for(scores_of(detectors["truth"], few))
+# print(f"false alarms: {np.mean(of_healthy['truth'] > new_threshold):.1%}")
 # ```
 #
 # Here, a good signal needs no model of the noise if a few real windows set the threshold. Notebook 28 asks how few are enough.

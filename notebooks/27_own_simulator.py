@@ -16,6 +16,7 @@
 
 # %%
 import numpy as np
+import pandas as pd
 from lesson_tools import ROOT, check_answer, drawing, open_study, say
 
 from enhsim_tf import clean, read_source
@@ -82,22 +83,26 @@ def fit_ridge_by_hand(columns, penalty):
         design.T @ design + penalty * np.eye(design.shape[1]), design.T @ (goal - goal.mean(axis=0))
     )
 
-    def predict(starts, run=inputs):
+    def predict(starts):
         rows = np.concatenate(
-            [(cut(run[name], starts) - inputs[name].mean()) / inputs[name].std() for name in columns], axis=1
+            [(cut(inputs[name], starts) - inputs[name].mean()) / inputs[name].std() for name in columns],
+            axis=1,
         )
         return goal.mean(axis=0) + (rows - centre) @ weights
 
     return predict
 
 
+def error_with(columns):
+    return nrmse(fit_ridge_by_hand(columns, penalty=10.0)(last), cut(target, last))
+
+
 gain, level = np.polyfit(inputs["volts"][: int(0.6 * len(target))], target[: int(0.6 * len(target))], 1)
-by_hand = fit_ridge_by_hand(["volts", "amperes", "celsius"], penalty=10.0)
 errors = {
     "coarse": nrmse(cut(inputs["volts"], last), cut(target, last)),
     "level and gain": nrmse(level + gain * cut(inputs["volts"], last), cut(target, last)),
-    "ridge, voltage alone": nrmse(fit_ridge_by_hand(["volts"], 10.0)(last), cut(target, last)),
-    "ridge, all columns": nrmse(by_hand(last), cut(target, last)),
+    "ridge, voltage alone": error_with(["volts"]),
+    "ridge, all columns": error_with(["volts", "amperes", "celsius"]),
 }
 say("NRMSE on held-out time: " + ", ".join(f"{name} **{value:.3f}**" for name, value in errors.items()) + ".")
 assert (
@@ -124,6 +129,11 @@ model, report = fit(cleaned.parts, simulator, options)
 for line in report.lines():
     print(line)
 
+# %% [markdown]
+# The *innovation* is what a linear prediction from the past does not explain. *Largest step* and *moving deviation* are the scores of one
+# line in notebook 24. *Range* is the share of time at which the coarse run leaves the values that it had in training. Its ridge regression
+# is the one above:
+
 # %%
 from enhsim_tf.enhancer.ridge import fit_ridge
 
@@ -139,40 +149,6 @@ say(
 )
 
 # %% [markdown]
-# ## A run with a fault
-#
-# `simulator_fault.csv` is a run of the coarse simulator with a fault; its column `mask` says where. `telemetry_fault.csv` is what the
-# vehicle would measure. The model turns the run into telemetry, and its *trust score* says where the run leaves the [range of the
-# training runs](../docs/glossary.md#trusted-range):
-
-# %%
-from enhsim_tf import TrustedRange
-
-fault = read_recording(folder / "simulator_fault.csv", model.alignment.columns, interval_s=model.interval_s)
-(part,) = model.alignment.usable(fault).parts
-measured = clean(read_source(folder / "telemetry_fault.csv")["volts"]).longest.values.astype(float)
-enhanced, labels = model.enhance_run(part.values)[:, 0], np.asarray(part.carried["mask"]) > 0
-coarse = part.values[:, model.alignment.columns.index("volts")]
-rms = {
-    name: np.sqrt(np.mean((values - measured)[labels] ** 2))
-    for name, values in (("coarse", coarse), ("enhanced", enhanced))
-}
-outside = TrustedRange(model).score_run(part.values) > 1
-say(
-    f"Error during the fault: coarse **{1e3 * rms['coarse']:.0f} mV**, enhanced **{1e3 * rms['enhanced']:.0f} mV**. The trust score "
-    f"marks **{outside[labels].mean():.0%}** of the fault as outside the range of the training runs, and "
-    f"{outside[~labels].mean():.0%} of the rest."
-)
-assert rms["enhanced"] < rms["coarse"] and outside[labels].mean() > outside[~labels].mean()
-beside = np.convolve(labels, np.ones(2 * window - 1), mode="same") > 0  # shares a window with the fault
-assert not outside[~beside].any()
-
-# %% [markdown]
-# The enhanced run is nearer to the truth than the coarse one also under a fault that training never saw. The trust score warns of this
-# extrapolation before anyone measures. It also marks half of the rest, all of it less than a window away from the fault: a sample gets the
-# mean score of all windows that contain it. A warning is no alarm: of the nominal time that `fit` held out, many samples are outside the
-# range, too (the line *range* above).
-#
 # ## A detector that knows what should happen
 #
 # Without a fault, telemetry minus enhanced run should be noise. So the detector looks at this residual only: its root mean square in
@@ -217,14 +193,17 @@ assert np.mean(later > threshold) <= np.mean(later > fitted_threshold)
 # %% [markdown]
 # Only the threshold by cross-fitting keeps about the rate that it was set for.
 #
-# What does the detector see of a fault that the simulator does not know? `simulator_planned.csv` is the coarse run of the same commands
-# without the fault.
+# ## A run with a fault
+#
+# `telemetry_fault.csv` is what the vehicle would measure in a run with a fault; the column `mask` of `simulator_fault.csv` says where.
+# `simulator_planned.csv` is the coarse run of the same commands *without* the fault: nobody told the simulator of it.
 
 # %%
-plan = read_recording(folder / "simulator_planned.csv", model.alignment.columns, interval_s=model.interval_s)
-(planned,) = model.alignment.usable(plan).parts
+measured = clean(read_source(folder / "telemetry_fault.csv")["volts"]).longest.values.astype(float)
+labels = pd.read_csv(folder / "simulator_fault.csv")["mask"].to_numpy() > 0
+(planned,) = read_recording(folder / "simulator_planned.csv").parts
 reference = {
-    "coarse run": planned.values[:, model.alignment.columns.index("volts")],
+    "coarse run": planned.values[:, simulator.columns.index("volts")],
     "enhanced run": model.enhance_run(planned.values)[:, 0],
 }
 own = {
@@ -248,10 +227,11 @@ with drawing(
     for name, color, style in (("coarse run", COARSE, DASHED), ("enhanced run", ENHANCED, "-")):
         panel.plot(time_h, 1e3 * scores[name], color=color, linestyle=style, label=f"telemetry minus {name}")
         panel.axhline(1e3 * own[name], color=color, linestyle=":", linewidth=0.9)
+        panel.text(time_h[-1], 1e3 * own[name], f" threshold,\n {name}", fontsize=6, va="center")
     shade = {"transform": panel.get_xaxis_transform(), "color": QUIET, "alpha": 0.2, "label": "fault"}
     panel.fill_between(time_h, 0, 1, where=in_fault, **shade)
     panel.set(
-        xlabel="time (h; dotted: the threshold of each)", ylabel="rms of the residual (mV)", yscale="log"
+        xlabel="time (h; grey: windows wholly in the fault)", ylabel="rms of the residual (mV)", yscale="log"
     )
     panel.minorticks_off()
     panel.set_yticks([5, 10, 20, 50, 100], ["5", "10", "20", "50", "100"])
@@ -266,6 +246,8 @@ say(
 assert alarms["enhanced run"][1] > alarms["coarse run"][1]
 
 # %% [markdown]
+# Windows that straddle the onset or the end of the fault count in neither share.
+#
 # ## What the study found
 #
 # This is one fault at its full severity, in one run. The [battery study](../studies/battery/README.md) has five faults at five
@@ -307,10 +289,12 @@ shifted = type(shifted)(shifted.values, shifted.interval_s, start=telemetry.star
 delay_s = None  # your answer; see help(estimate_delay)
 
 # %%
+from notebooks import answers_tool
+
 check_answer(
     delay_s,
-    lambda answer: answer == estimate_delay([shifted], simulator, window).seconds,
-    "Everything happens earlier in the telemetry now. The field is called seconds.",
+    lambda answer: answer == answers_tool.delay_s(shifted, simulator, window),
+    "Everything happens earlier in the telemetry now; help(estimate_delay) says what a sign means.",
 )
 
 # %% [markdown]
@@ -323,12 +307,8 @@ ratio = None  # your answer
 # %%
 check_answer(
     ratio,
-    lambda answer: np.isclose(
-        answer * errors["ridge, all columns"],
-        nrmse(fit_ridge_by_hand(["volts", "amperes"], 10)(last), cut(target, last)),
-        rtol=0.01,
-    ),
-    "Use fit_ridge_by_hand with two columns and the penalty 10, and the windows `last`.",
+    lambda answer: np.isclose(answer, answers_tool.ratio_without_temperature(error_with), rtol=0.01),
+    "Use the function that gives the errors above.",
 )
 
 # %% [markdown]
@@ -349,7 +329,8 @@ check_answer(
 # <details><summary>2. The temperature</summary>
 #
 # ```python
-# ratio = nrmse(fit_ridge_by_hand(["volts", "amperes"], 10.0)(last), cut(target, last)) / errors["ridge, all columns"]
+# ratio = error_with(["volts", "amperes"]) / errors["ridge, all columns"]
+# print(f"{ratio:.2f}")
 # ```
 #
 # A ratio near 1 means that the temperature adds little, and the current is what helps.

@@ -17,18 +17,21 @@
 # detector on that?
 
 # %%
+import itertools
+
 import numpy as np
-from lesson_tools import check_answer, drawing, open_pipeline, open_study, say, slider
+import pandas as pd
+from lesson_tools import check_answer, drawing, open_pipeline, open_study
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
 from enhsim_tf.detection import metrics
+from enhsim_tf.detection.anomalies import INJECTIONS, inject
 from enhsim_tf.detection.detectors import PCAResidual
-from enhsim_tf.enhancer import ridge as packaged
-from studies.common.metrics import recall_at_real_rate
-from studies.common.settings import make_settings
-from studies.few_windows.cells import World
+from enhsim_tf.enhancer.ridge import fit_ridge, time_blocks
 
-budget = open_pipeline()[1]  # nothing else of the paper's example is used here
+pipeline, budget = open_pipeline()
 is_full = budget == "full"
 
 # %% [markdown]
@@ -36,23 +39,41 @@ is_full = budget == "full"
 #
 # The waves are those of the paper's example, but neighbouring samples of the noise are correlated. Known are the square waves and one
 # contiguous *record* of $k$ windows of 500 samples, from which both methods may cut overlapping windows. Of the later nominal windows,
-# half count false alarms, and half set the threshold for the recall at the real rate. Windows with injected anomalies count what is
-# found.
+# half count false alarms, and half set the threshold for the recall at the real rate. Windows with injected anomalies of the package's
+# kinds count what is found. One draw says little about five windows, so all results are means over draws.
 
 # %%
-NUM_REAL = (5, 20, 100) if is_full else (5, 20)
-small = {"num_real": NUM_REAL, "num_windows": 200, "num_judged": 400, "num_anomalous": 24}
-if not is_full:
-    small |= {"num_windows": 60, "num_judged": 60, "num_anomalous": 6}
-small = {f"few_windows__{name}": value for name, value in small.items()}
-# 100 is not one of the seeds of the published curve
-world = World(make_settings(budget, **small).of("autoregressive", 100))
-records = {k: world.record(k) for k in NUM_REAL}
-judged = world.judged
-for k, record in records.items():
-    print(
-        f"k = {k:3}: {len(record.telemetry):6,} samples, {len(record.windows)} overlapping windows, {k} disjoint ones"
-    )
+window, NUM_REAL, num_judged, seeds = (
+    (500, (5, 20, 100), 400, range(10)) if is_full else (500, (5, 20), 100, range(2))
+)
+border = max(NUM_REAL) * window  # the records end here
+
+
+def cut(values, starts):
+    return np.stack([values[start : start + window] for start in starts])
+
+
+def draw_telemetry(seed):
+    """The coarse run, the telemetry, and later windows: nominal, reference and anomalous."""
+    rng, time = np.random.default_rng(seed), np.arange(border + (2 * num_judged + 1) * window, dtype=float)
+    noise = 0.1 * lfilter([np.sqrt(1 - 0.7**2)], [1, -0.7], rng.standard_normal(len(time)))
+    telemetry = pipeline.truth(time).ravel() + noise
+    nominal, reference = np.split(cut(telemetry, border + window * np.arange(1, 2 * num_judged + 1)), 2)
+    anomalous = [
+        inject(nominal[first :: len(INJECTIONS)], kind, severity=4.0, duration=100, noise_sd=0.1, rng=rng)[0]
+        for first, kind in enumerate(INJECTIONS)
+    ]
+    return pipeline.simulator(time).ravel(), telemetry, (nominal, reference, np.concatenate(anomalous))
+
+
+draws = {seed: draw_telemetry(seed) for seed in seeds}
+
+
+def record_of(seed, k):
+    """Starts of overlapping windows of a record of k windows, and the coarse and the real windows."""
+    starts = np.linspace(border - k * window, border - window, 200).astype(int)
+    return starts, *(cut(values, starts) for values in draws[seed][:2])
+
 
 # %% [markdown]
 # ## Real windows alone
@@ -63,7 +84,7 @@ for k, record in records.items():
 
 
 # %%
-def folds_of_time(starts, num_blocks=5, window=500):
+def folds_of_time(starts, num_blocks=5):
     order, folds = np.argsort(starts, kind="stable"), []
     for held_out in np.array_split(order, num_blocks):
         rest = np.setdiff1d(order, held_out, assume_unique=True)  # keeps the order of time
@@ -73,59 +94,55 @@ def folds_of_time(starts, num_blocks=5, window=500):
     return folds
 
 
-def cross_fitted_scores(record):
-    scores = np.empty(len(record.windows))
-    for training, held_out in folds_of_time(record.starts):
-        detector = PCAResidual().fit(record.windows[training])
-        scores[held_out] = detector.score(record.windows[held_out])
+def cross_fitted_scores(starts, windows):
+    scores = np.empty(len(starts))
+    for training, held_out in folds_of_time(starts):
+        scores[held_out] = PCAResidual().fit(windows[training]).score(windows[held_out])
     return scores
 
 
-for k in NUM_REAL[1:]:
-    expected = packaged.time_blocks(records[k].starts, 5, 500)
-    for mine, ours in zip(folds_of_time(records[k].starts), expected):
-        np.testing.assert_array_equal(mine[0], ours[0])
-        np.testing.assert_array_equal(mine[1], ours[1])
+starts, _, _ = record_of(0, 20)
+for mine, ours in zip(folds_of_time(starts), time_blocks(starts, 5, window)):
+    np.testing.assert_array_equal(np.concatenate(mine), np.concatenate(ours))
+
 
 # %%
-real, naive, fitted = {}, {}, {}
-for k, record in records.items():
-    real[k] = PCAResidual().fit(record.windows)
-    naive[k], fitted[k] = real[k].score(record.windows), cross_fitted_scores(record)
-
-
-def alarms_of(detector, threshold_scores):
+def alarms_of(seed, detector, threshold_scores):
     """False alarms on later nominal windows, with the conformal threshold of 1 % from the given scores."""
     limit = metrics.finite_threshold(threshold_scores, 0.01)[0]
-    return np.mean(detector.score(judged["nominal"]) > limit)
+    nominal, _, _ = draws[seed][2]
+    return np.mean(detector.score(nominal) > limit)
 
 
-rates = {
-    "threshold from the training windows": [alarms_of(real[k], naive[k]) for k in NUM_REAL],
-    "threshold by cross-fitting": [alarms_of(real[k], fitted[k]) for k in NUM_REAL],
-}
-title = (
-    f"With {NUM_REAL[0]} windows, cross-fitting lowers false alarms from {rates['threshold from the training windows'][0]:.0%} to "
-    f"{rates['threshold by cross-fitting'][0]:.1%}"
-)
-alt = "False alarms over the number of real windows, for two ways to set the threshold on the same windows"
-with drawing(alt, height=2.1, title=title) as panel:
-    for (name, values), (color, style, marker) in zip(
-        rates.items(), ((QUIET, DASHED, "s"), (REAL, "-", "o"))
-    ):
-        panel.plot(
-            NUM_REAL,
-            [100 * value for value in values],
-            color=color,
-            linestyle=style,
-            marker=marker,
-            markersize=4,
-            label=name,
-        )
-    panel.axhline(1, color=QUIET, linewidth=0.6)
-    panel.set(xlabel="number of real windows k", ylabel="false alarms (%)", xscale="log", ylim=(0, None))
+real, alarms = {}, {}
+for seed, k in itertools.product(seeds, NUM_REAL):
+    starts, _, windows = record_of(seed, k)
+    real[seed, k] = PCAResidual().fit(windows)
+    alarms[seed, k] = {
+        "threshold from the training windows": alarms_of(seed, real[seed, k], real[seed, k].score(windows)),
+        "threshold by cross-fitting": alarms_of(seed, real[seed, k], cross_fitted_scores(starts, windows)),
+    }
+rates = pd.DataFrame(alarms).T.groupby(level=1).mean()  # over the draws
+
+
+def curve(panel, values, label, color, style, marker):
+    percent = [100 * value for value in values]
+    panel.plot(NUM_REAL, percent, color=color, linestyle=style, marker=marker, markersize=4, label=label)
+    panel.set(xlabel="number of real windows k", xscale="log")
     panel.set_xticks(NUM_REAL, list(map(str, NUM_REAL)))
     panel.minorticks_off()
+    panel.margins(x=0.05)
+
+
+title = f"With {NUM_REAL[0]} windows, cross-fitting lowers false alarms from {rates.iloc[0, 0]:.0%} to {rates.iloc[0, 1]:.0%}"
+alt = "False alarms over the number of real windows, for two ways to set the threshold on the same windows"
+with drawing(alt, height=2.1, title=title) as panel:
+    for (name, values), look in zip(rates.items(), ((QUIET, DASHED, "s"), (REAL, "-", "o"))):
+        curve(panel, values, name, *look)
+    panel.axhline(1, color=QUIET, linestyle=":", label="set for 1 %")
+    panel.set_yscale("symlog", linthresh=1)
+    panel.set(ylabel="false alarms (%)", ylim=(-0.1, 150))
+    panel.set_yticks([0, 1, 10, 100], ["0", "1", "10", "100"])
     panel.legend(frameon=False)
 
 # %% [markdown]
@@ -133,157 +150,113 @@ with drawing(alt, height=2.1, title=title) as panel:
 # windows, and of no others. Cross-fitting comes much nearer to the 1 % that was asked for, but with five windows it is still above it.
 
 # %%
-for name, values in rates.items():
-    print(f"{name:38}" + "".join(f"   k = {k}: {value:6.1%}" for k, value in zip(NUM_REAL, values)))
-assert rates["threshold from the training windows"][0] > rates["threshold by cross-fitting"][0]
+print(rates.rename_axis("k").round(4).to_string())
+if is_full:
+    assert (rates["threshold from the training windows"] > 5 * rates["threshold by cross-fitting"]).all()
+    assert rates["threshold by cross-fitting"].iloc[0] > 0.01
 
 # %% [markdown]
 # ## A simulator that is fitted to the same windows
 #
 # The simulator uses the same record: ridge regression from square waves to the record, and noise fitted to its residuals. These must be
 # cross-fitted for the same reason as the scores. The noise is a Gaussian *autoregression*: each sample is a weighted sum of the samples
-# before it, plus a random number (notebook 25). It has few parameters. Once fitted, it generates as many windows as wanted: some to train
-# the detector on, and others to set its threshold.
+# before it, plus a random number (notebook 25). It has few parameters, here ten weights and a variance. Once fitted, it generates as many
+# windows as wanted: some to train the detector on, and others to set its threshold.
 
 
 # %%
-def cross_fitted_residuals(record):
-    seconds = record.telemetry.offset_s + record.telemetry.interval_s * (
-        record.starts[:, None] + np.arange(500)
-    )
-    coarse, noise = record.coarse.simulate(seconds), np.empty_like(record.windows)
-    for training, held_out in folds_of_time(record.starts):
-        enhancer = packaged.fit_ridge(coarse[training], record.windows[training], record.starts[training])
-        noise[held_out] = record.windows[held_out] - enhancer.predict(coarse[held_out])
+def cross_fitted_residuals(starts, inputs, windows):
+    noise = np.empty_like(windows)
+    for training, held_out in folds_of_time(starts):
+        enhancer = fit_ridge(inputs[training], windows[training], starts[training])
+        noise[held_out] = windows[held_out] - enhancer.predict(inputs[held_out])
     return noise
 
 
-middle = NUM_REAL[1]
-np.testing.assert_allclose(cross_fitted_residuals(records[middle]), records[middle].residuals[0], atol=1e-5)
+def fit_simulator(starts, inputs, windows, order=10):
+    """A function that generates windows: enhanced windows of other times, and noise of an autoregression."""
+    enhancer = fit_ridge(inputs, windows, starts)
+    noise = cross_fitted_residuals(starts, inputs, windows)
+    r = np.array([np.mean(noise[:, : window - lag] * noise[:, lag:]) for lag in range(order + 1)])
+    weights = np.linalg.solve(toeplitz(r[:order]), r[1:])
+    sd = np.sqrt(r[0] - weights @ r[1:])
+
+    def generate(number, rng):
+        times = rng.integers(0, 1_000_000, number)[:, None] + np.arange(window, dtype=float)
+        steps = sd * rng.standard_normal((number, window + 200))
+        noise = lfilter([1.0], [1.0, *-weights], steps, axis=1)[:, 200:]
+        return enhancer.predict(pipeline.simulator(times)) + noise
+
+    return generate
+
 
 # %%
-generated = 400 if is_full else 60
-simulated, further = {}, {}
-for k, record in records.items():
-    simulated[k] = PCAResidual().fit(record.generate("autoregression", generated, 1))
-    further[k] = simulated[k].score(record.generate("autoregression", generated, 2))
-arms = {
-    "real windows alone": [(real[k], fitted[k]) for k in NUM_REAL],
-    "simulator fitted to them": [(simulated[k], further[k]) for k in NUM_REAL],
-}
-alarms = {name: np.array([alarms_of(*each) for each in pairs]) for name, pairs in arms.items()}
-recall = {
-    name: np.array(
-        [
-            recall_at_real_rate(detector.score(judged["reference"]), detector.score(judged["anomalous"]))
-            for detector, _ in pairs
-        ]
-    )
-    for name, pairs in arms.items()
-}
+def recall_of(seed, detector):
+    """Recall at the real rate: the threshold comes from further real windows."""
+    _, reference, anomalous = draws[seed][2]
+    return np.mean(detector.score(anomalous) > metrics.finite_threshold(detector.score(reference), 0.01)[0])
+
+
+number, results = 400 if is_full else 100, {}
+for seed, k in itertools.product(seeds, NUM_REAL):
+    generate = fit_simulator(*record_of(seed, k))
+    simulated = PCAResidual().fit(generate(number, np.random.default_rng(1)))
+    further = simulated.score(generate(number, np.random.default_rng(2)))
+    results[seed, k] = {
+        ("false alarms", "real windows alone"): alarms[seed, k]["threshold by cross-fitting"],
+        ("false alarms", "simulator fitted to them"): alarms_of(seed, simulated, further),
+        ("recall", "real windows alone"): recall_of(seed, real[seed, k]),
+        ("recall", "simulator fitted to them"): recall_of(seed, simulated),
+    }
+table = pd.DataFrame(results).T.groupby(level=1).mean()  # over the draws
 
 # %%
 alt = "False alarms and recall of both arms over the number of real windows"
-title = (
-    f"With {NUM_REAL[0]} windows, false alarms are {alarms['real windows alone'][0]:.1%} alone, "
-    f"{alarms['simulator fitted to them'][0]:.1%} with the simulator"
-)
+first = table["false alarms"].iloc[0]
+title = f"With {NUM_REAL[0]} windows, false alarms are {first.iloc[0]:.0%} alone, {first.iloc[1]:.0%} with the simulator"
 with drawing(alt, 2, 2.4, title) as (left, right):
-    for name, (color, style, marker) in zip(arms, ((REAL, "-", "o"), (AVERAGE, DASHED, "^"))):
-        look = {"color": color, "linestyle": style, "marker": marker, "markersize": 4, "label": name}
-        left.plot(NUM_REAL, 100 * alarms[name], **look)
-        right.plot(NUM_REAL, 100 * recall[name], **look)
-    left.axhline(1, color=QUIET, linewidth=0.6)
-    left.set(ylabel="false alarms (%), set for 1 %", ylim=(0, None))
-    right.set(ylabel="recall at the real rate (%)", ylim=(0, 100))
+    for name, look in zip(first.index, ((REAL, "-", "o"), (AVERAGE, DASHED, "^"))):
+        curve(left, table["false alarms", name], name, *look)
+        curve(right, table["recall", name], name, *look)
+    left.axhline(1, color=QUIET, linestyle=":")
+    left.set(ylabel="false alarms (%), set for 1 %", ylim=(-0.3, None))
+    right.set(ylabel="recall at the real rate (%)", ylim=(0, 103))
     right.legend(frameon=False, loc="lower right")
-    for panel in (left, right):
-        panel.set(xlabel="number of real windows k", xscale="log")
-        panel.set_xticks(NUM_REAL, list(map(str, NUM_REAL)))
-        panel.minorticks_off()
 
 # %% [markdown]
-# *What to see:* with five windows, the simulator gives fewer false alarms; with more, neither exceeds 1 %. On the right, it finds
-# somewhat fewer anomalies in this run. Whether such an exchange *pays* needs a rule.
+# *What to see:* with the simulator there are hardly any false alarms: its thresholds are rather too high. On the right, it finds somewhat
+# fewer anomalies, and the difference is largest with five windows. Whether such an exchange *pays* needs a rule.
 
 # %%
-for position, k in enumerate(NUM_REAL):
-    print(
-        f"k = {k:3}   "
-        + "   ".join(
-            f"{name}: {alarms[name][position]:5.1%} false alarms, {recall[name][position]:4.0%} recall"
-            for name in arms
-        )
-    )
+print(table.rename_axis("k").round(4).to_string())
+lost = table["recall", "real windows alone"] - table["recall", "simulator fitted to them"]
 if is_full:
-    assert alarms["simulator fitted to them"][0] < alarms["real windows alone"][0]
-    assert np.all(recall["simulator fitted to them"] < recall["real windows alone"] + 0.03)
-
-# %% [markdown]
-# This is one seed, one detector and one kind of noise. The slider shows the scores.
-
-
-# %%
-def draw(k):
-    alt = f"Scores of later nominal windows and the thresholds of both arms for {k} real windows"
-    shares = [alarms[name][NUM_REAL.index(k)] for name in arms]
-    title = (
-        f"k = {k}: {shares[0]:.1%} exceed the threshold from real windows, {shares[1]:.1%} the simulator's"
-    )
-    with drawing(alt, 2, 2.0, title, sharex=True, sharey=True) as panels:
-        for panel, (name, pairs), color in zip(panels, arms.items(), (REAL, AVERAGE)):
-            detector, own = pairs[NUM_REAL.index(k)]
-            panel.hist(
-                1e3 * detector.score(judged["nominal"]),
-                30,
-                color=QUIET,
-                alpha=0.5,
-                label="later nominal windows",
-            )
-            panel.margins(x=0.1, y=0.5)
-            panel.axvline(
-                1e3 * metrics.finite_threshold(own, 0.01)[0], color=color, linestyle=DASHED, label="threshold"
-            )
-            panel.set_title(name, loc="left")
-            panel.set(xlabel="score (mean squared residual × 1,000)", ylabel="windows")
-            panel.legend(frameon=False, fontsize=7, loc="upper left")
-
-
-slider(draw, "number of real windows", NUM_REAL, shown=NUM_REAL[:2])
+    assert (
+        table["false alarms", "simulator fitted to them"] < table["false alarms", "real windows alone"]
+    ).all()
+    assert lost.min() > 0 and lost.idxmax() == NUM_REAL[0]
 
 # %% [markdown]
 # ## The published curve
 #
 # The [study](../studies/few_windows/README.md) has ten seeds, four detectors, more methods, and four kinds of noise: white,
-# autoregressive (neighbours are correlated), heteroscedastic (its loudness changes slowly) and shot (rare pulses). Its rule was fixed
-# before the first run:
+# autoregressive (neighbours are correlated), heteroscedastic (its loudness changes slowly) and shot (rare pulses). The lesson above
+# has one detector and one kind of noise. The study's rule was fixed before its first run:
 #
 # - A simulator *pays* where the excess of the real windows is more than half a point, its own is at most half of that, and its recall at
 #   the real rate is at most 3 points lower.
 # - Real windows *suffice* from a number on if their excess is at most half a point there and at all larger numbers.
 
-# %%
-from studies.few_windows.summary import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
 
-excess = {name: values - RATE for name, values in alarms.items()}
-pays_here = [
-    k
-    for position, k in enumerate(NUM_REAL)
-    if excess["real windows alone"][position] > SUFFICES
-    and max(excess["simulator fitted to them"][position], 0)
-    <= PAYS_SHARE * excess["real windows alone"][position]
-    and recall["real windows alone"][position] - recall["simulator fitted to them"][position]
-    <= MAX_RECALL_LOSS
-]
-say(
-    f"By this rule, the simulator of the live example pays at: **{', '.join(map(str, pays_here)) or 'none of its numbers'}**. "
-    f"Its recall is lower than that of real windows alone by "
-    + ", ".join(
-        f"**{100 * loss:.1f} points** at {k}"
-        for k, loss in zip(NUM_REAL, recall["real windows alone"] - recall["simulator fitted to them"])
-    )
-    + "."
-)
+# %%
+def pays(real_alarms, own_alarms, recall_loss):
+    real_excess, own_excess = real_alarms - 0.01, own_alarms - 0.01
+    return real_excess > 0.005 and own_excess <= 0.5 * real_excess and recall_loss <= 0.03
+
+
+for k in NUM_REAL:
+    answer = "pays" if pays(*table.loc[k, "false alarms"], lost[k]) else "does not pay"
+    print(f"k = {k}: recall lower by {100 * lost[k]:.1f} points; the simulator {answer}")
 
 # %%
 found, _ = open_study("few_windows")
@@ -300,38 +273,41 @@ with drawing(alt, len(environments), 2.6, title, sharex=True, sharey=True) as pa
     for panel, (environment, about) in zip(panels, environments.items()):
         for arm, (label, color, marker) in shown.items():
             excess = [100 * about["arms"][arm]["excess"][str(number)] for number in numbers]
-            panel.plot(numbers, excess, marker, color=color, markersize=4, label=label)
-        panel.axhline(100 * SUFFICES, color=QUIET, linewidth=0.6, linestyle=DASHED)
+            panel.plot(
+                numbers, excess, marker, color=color, markersize=4, markerfacecolor="none", label=label
+            )
+        panel.axhline(0.5, color=QUIET, linewidth=0.6, linestyle=DASHED)
         panel.set_xscale("log")
         panel.set_yscale("symlog", linthresh=1)
         panel.set_title(environment, loc="left")
-        panel.set_xticks([10, 100, 1_000, 10_000], ["10", "100", "1,000", ""])
+        panel.set_xticks([10, 100, 1_000, 10_000], ["10", "100", "1k", "10k"])
         panel.minorticks_off()
         panel.set_xlabel("real windows k")
+        panel.margins(x=0.08)
     panels[0].set_yticks([0, 1, 10, 50], ["0", "1", "10", "50"])
-    panels[0].set_ylabel("excess (points)")
+    panels[0].set_ylabel("excess (points; linear below 1)")
     panels[-1].legend(frameon=False, fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
 
 # %% [markdown]
 # *What to see:* where the noise model describes the noise, the simulator stays within half a point (dashed) from five windows on, and the
 # real windows from 50 on. Where it does not, no number of windows brings it down. With autoregressive noise, the simulator pays in the
-# study's means, and did not for the one seed above.
+# study, whose numbers are means over four detectors; it did not for the one detector above, which lost too much recall.
 
 # %%
+print("numbers of windows in the study:", numbers)
 for environment, about in environments.items():
-    pays = sorted(set(sum(about["pays"].values(), [])))
+    paid = sorted(set(sum(about["pays"].values(), [])))
     enough = about["real_suffices_from"]
-    told = f"{pays[0]} to {pays[-1]}" if pays else "none"
+    told = f"{paid[0]} to {paid[-1]}" if paid else "none"
     print(f"{environment:16} a simulator pays at {told:8} real windows suffice from {enough:,}")
-    assert all(number < enough for number in pays)
+    assert all(number < enough for number in paid)
 assert paying == ["white", "autoregressive"]
 
 # %% [markdown]
-# **Answer.** It depends on the noise: from 50 windows on where it is white or autoregressive, from 100 on with shot noise, and from 1,000
-# on where it is heteroscedastic. Below that, a simulator paid with 5 to 20 windows, and only with a noise model that describes the noise.
-# (A gap in the rule: a threshold that is far too high passes as well.)
-
-# %% [markdown]
+# **Answer.** It depends on the noise: in the study from 50 windows on where it is white or autoregressive, from 100 on with shot noise, and
+# from 1,000 on where it is heteroscedastic. Below that, a simulator paid with 5 to 20 windows, and only with a noise model that describes
+# the noise. (A gap in the rule: a threshold that is far too high passes as well.)
+#
 # ## Exercises
 #
 # **1.** A threshold from $n$ independent scores is finite for a false-alarm rate of 1 % only if $n$ is large enough. What is the smallest
@@ -414,6 +390,7 @@ check_answer(
 #     print(f"{environment}, excess at most {limit:.1%}: from {suffices_from(environment, limit)}")
 # ```
 #
-# Where the answer jumps with a small change of the tolerance, the curve is flat or noisy there.
+# Where the answer jumps with a small change of the tolerance, the curve is flat or noisy there: on heteroscedastic noise, 300 windows miss
+# the half point by very little.
 #
 # </details>

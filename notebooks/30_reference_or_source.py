@@ -15,7 +15,7 @@
 # %%
 import numpy as np
 import pandas as pd
-from lesson_tools import ROOT, check_answer, drawing, open_study, say
+from lesson_tools import ROOT, check_answer, drawing, open_study
 
 from enhsim_tf import clean, read_recording, read_source
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, REAL
@@ -52,7 +52,7 @@ later = np.arange(border + window, len(telemetry) - window + 1, 25)
 fault = np.array(
     [start for start in range(0, len(faulty) - window + 1, 25) if is_fault[start : start + window].all()]
 )
-say(f"**{len(known)}** known windows, **{len(later)}** later ones, **{len(fault)}** with the fault.")
+print(f"{len(known)} known windows, {len(later)} later ones, {len(fault)} with the fault")
 
 # %% [markdown]
 # ## The same detector for every use
@@ -98,35 +98,49 @@ def source(learnt):
     )
 
 
-def judge(see, learn=None):
-    """Shares found and falsely flagged. `see` is what the detector sees; `learn` makes the windows that it learns, if others."""
+# view(learnt, simulated, real, starts): what the detector sees of the windows at `starts`, if only the known windows `learnt` may be used
+def judge(view, generate=None):
+    """Shares found and falsely flagged. The detector learns what it sees of known windows, or what `generate` makes of them."""
     scores, every = np.empty(len(known)), np.arange(len(known))
     for learnt, held_out in time_blocks(known, 5, window):
-        training = see(learnt, run, telemetry, known[learnt]) if learn is None else learn(learnt)
-        scores[held_out] = fit_distance(training)(see(learnt, run, telemetry, known[held_out]))
-    detector = fit_distance(see(every, run, telemetry, known) if learn is None else learn(every))
+        training = generate(learnt) if generate else view(learnt, run, telemetry, known[learnt])
+        scores[held_out] = fit_distance(training)(view(learnt, run, telemetry, known[held_out]))
+    detector = fit_distance(generate(every) if generate else view(every, run, telemetry, known))
     limit = conformal(scores)
     return {
-        "found": np.mean(detector(see(every, planned, faulty, fault)) > limit),
-        "false alarms": np.mean(detector(see(every, run, telemetry, later)) > limit),
+        "found": np.mean(detector(view(every, planned, faulty, fault)) > limit),
+        "false alarms": np.mean(detector(view(every, run, telemetry, later)) > limit),
     }
 
 
-# the simulator's columns are voltage, current and temperature; the current is what was commanded
-def beside(columns):
-    return lambda learnt, simulated, real, starts: reference(
-        columns, learnt, cut(simulated, starts), cut(real, starts)
-    )
+# %% [markdown]
+# Five uses differ only in what the detector sees. The simulator's columns are voltage, current and temperature; the current is what was
+# commanded.
+
+
+# %%
+def window_alone(learnt, simulated, real, starts):
+    return cut(real, starts)
+
+
+def minus_coarse(learnt, simulated, real, starts):
+    return cut(real, starts) - cut(simulated, starts)[:, :, 0]
+
+
+def minus_enhanced(learnt, simulated, real, starts, columns=(0, 1, 2)):
+    return reference(list(columns), learnt, cut(simulated, starts), cut(real, starts))
+
+
+def minus_enhanced_current(learnt, simulated, real, starts):
+    return minus_enhanced(learnt, simulated, real, starts, columns=[1])
 
 
 results = {
-    "reference, enhanced run": judge(beside([0, 1, 2])),
-    "reference, coarse run": judge(
-        lambda learnt, simulated, real, starts: cut(real, starts) - cut(simulated, starts)[:, :, 0]
-    ),
-    "reference, current alone": judge(beside([1])),
-    "source, enhanced windows": judge(lambda learnt, simulated, real, starts: cut(real, starts), source),
-    "no simulator": judge(lambda learnt, simulated, real, starts: cut(real, starts)),
+    "reference, enhanced run": judge(minus_enhanced),
+    "reference, coarse run": judge(minus_coarse),
+    "reference, current alone": judge(minus_enhanced_current),
+    "source, enhanced windows": judge(window_alone, source),
+    "no simulator": judge(window_alone),
 }
 
 # %%
@@ -138,24 +152,24 @@ with drawing(alt, height=2.2, title=title) as panel:
     for offset, (kind, color, hatch) in zip(
         (-0.19, 0.19), (("found", ENHANCED, ""), ("false alarms", "white", "////"))
     ):
-        values = [found[kind] for found in results.values()]
+        values = [100 * found[kind] for found in results.values()]
         bars = panel.barh(
             places + offset, values, 0.36, color=color, hatch=hatch, edgecolor=ENHANCED, label=kind
         )
-        panel.bar_label(bars, [f"{value:.0%}" for value in values], padding=2, fontsize=7)
+        panel.bar_label(bars, fmt="%.0f", padding=2, fontsize=7)
     panel.set_yticks(places, list(results))
     panel.invert_yaxis()
-    panel.set(xlabel="share of windows (thresholds set for 1 %)", xlim=(0, 1))
+    panel.set(xlabel="windows (%; thresholds set for 1 %)", xlim=(0, 100))
     panel.legend(frameon=False, loc="lower right")
 
 # %% [markdown]
 # *What to see:* as a reference, the simulator finds most of the fault; as a source, it finds as little as no simulator does, and flags as
 # many nominal windows. A detector that looks at a window alone must accept every voltage that some nominal window has. The reference is
 # told what was commanded; the current alone does not say which voltage follows. No use keeps to the 1 % that its threshold was set for.
+# (Notebook 27 has another detector on the same run; its shares are of other windows.)
 
 # %%
-for name, found in results.items():
-    print(f"{name:26} found {found['found']:5.0%}   false alarms {found['false alarms']:5.1%}")
+print(pd.DataFrame(results).T.round(3).to_string())
 assert results["reference, enhanced run"]["found"] > 3 * results["source, enhanced windows"]["found"]
 assert results["reference, enhanced run"]["found"] > results["reference, coarse run"]["found"]
 assert results["reference, enhanced run"]["found"] > 3 * results["reference, current alone"]["found"]
@@ -164,8 +178,8 @@ assert results["reference, enhanced run"]["found"] > 3 * results["reference, cur
 # ## What the study found
 #
 # The [study](../studies/reference_or_source/README.md) has two systems, eleven kinds of faults, and one detector for all uses (the distance
-# of the channels' means). It has run on eight seeds; its intervals are wide. Here are means for the battery, with a simulator of *wrong
-# physics* (a simpler model):
+# of the channels' means). Here are means over seeds for the battery, with a simulator of *wrong physics* (a simpler model). The shaded
+# ranges are 95 % intervals of two uses:
 
 # %%
 systems = open_study("reference_or_source")[0]["systems"]
@@ -187,14 +201,22 @@ title = f"With {num_windows[-1]:,} known windows, the reference finds {last_of['
 alt = "Share of fault windows found over the number of known windows, for four uses of a simulator"
 with drawing(alt, height=2.4, title=title) as panel:
     for use, (label, color, style, marker) in names.items():
+        percent = [100 * value for value in recall[use]]
         panel.plot(
-            num_windows, recall[use], color=color, linestyle=style, marker=marker, markersize=4, label=label
+            num_windows, percent, color=color, linestyle=style, marker=marker, markersize=4, label=label
         )
-    panel.set(xlabel="known windows", ylabel="fault windows found", xscale="log", ylim=(0, 1))
+    for use in ("reference", "source"):
+        low, high = ([100 * point["uses"][use]["recall"][end] for point in points] for end in ("low", "high"))
+        panel.fill_between(num_windows, low, high, color=names[use][1], alpha=0.15, linewidth=0)
+    panel.set(xlabel="known windows", ylabel="fault windows found (%)", xscale="log", ylim=(0, 100))
     panel.set_xlim(0.85 * num_windows[0], 1.18 * num_windows[-1])
     panel.set_xticks(num_windows, [f"{number:,}" for number in num_windows])
     panel.minorticks_off()
     panel.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
+
+# %% [markdown]
+# The intervals are wide. The next table has the false alarms of the battery with the fewest known windows, and what is found on the
+# *aircraft*, whose simulator is a point mass, with ten flights or 100 known windows.
 
 # %%
 flights = next(
@@ -203,18 +225,17 @@ flights = next(
     if point["axis"] == "main" and point["simulator"] == "wrong physics" and point["units"] == 10
 )
 of_aircraft = {use: flights[use]["recall"]["mean"] for use in names}
-say(
-    "On the aircraft, whose simulator is a point mass: "
-    + ", ".join(f"{names[use][0]} **{share:.1%}**" for use, share in of_aircraft.items())
-    + "."
-)
+of_battery = {use: points[0]["uses"][use]["false_alarms"]["mean"] for use in names}
+columns = {f"battery, {num_windows[0]} windows: false alarms": of_battery, "aircraft: found": of_aircraft}
+print(pd.DataFrame(columns).round(3).to_string())
 assert min(recall["reference"]) > max(recall["source"])
 assert of_aircraft["reference"] - of_aircraft["no simulator"] < 0.1
+assert min(of_battery.values()) > 0.03
 
 # %% [markdown]
 # **Answer.** As a reference, where the simulator is near enough to the vehicle, as on the battery. As a source it adds little to what the
-# telemetry alone finds. On the aircraft, neither helps much, and the enhanced run finds no more than the coarse one.
-# With 30 known windows, no threshold holds on the battery: about 7 % of the nominal windows raise an alarm, whatever the use.
+# telemetry alone finds. On the aircraft, neither helps much, and the enhanced run finds hardly more than the coarse one. With the fewest
+# known windows, no use keeps to 1 % of false alarms on the battery.
 #
 # ## Exercises
 #
@@ -227,21 +248,23 @@ false_alarms_late = None  # your answer
 # %%
 check_answer(
     false_alarms_late,
-    lambda share: 0.9 < share < 1,
+    lambda share: abs(share - 0.96) < 0.015,
     "Only the judged time is late: known windows keep the simulated run of their own time.",
 )
 
 # %% [markdown]
-# **2.** With a lower threshold, *no simulator* would find as many windows as the enhanced run does as a reference. What share of false
-# alarms would that cost?
+# **2.** With a lower threshold, *no simulator* would find as many windows as the enhanced run does as a reference. Which threshold is that?
+# What share of false alarms would it cost?
 
 # %%
-cost = None  # your answer
+detector = fit_distance(cut(telemetry, known))
+lower_threshold = None  # your answer
 
 # %%
+found_with = None if lower_threshold is None else np.mean(detector(cut(faulty, fault)) > lower_threshold)
 check_answer(
-    cost,
-    lambda share: 0.5 < share <= 1,
+    found_with,
+    lambda share: abs(share - results["reference, enhanced run"]["found"]) < 0.02,
     "Sort the scores of the fault's windows; the threshold is the score that as many exceed as the reference finds.",
 )
 
@@ -253,7 +276,7 @@ check_answer(
 # ```python
 # def late(learnt, simulated, real, starts):
 #     is_known = starts[-1] <= known[-1] and real is telemetry
-#     return beside([0, 1, 2])(learnt, simulated if is_known else np.roll(simulated, 50, axis=0), real, starts)
+#     return minus_enhanced(learnt, simulated if is_known else np.roll(simulated, 50, axis=0), real, starts)
 #
 #
 # found = judge(late)
@@ -269,11 +292,9 @@ check_answer(
 # <details><summary>2. The price of a lower threshold</summary>
 #
 # ```python
-# detector = fit_distance(cut(telemetry, known))
 # wanted = results["reference, enhanced run"]["found"]
-# limit = np.quantile(detector(cut(faulty, fault)), 1 - wanted)
-# cost = np.mean(detector(cut(telemetry, later)) > limit)
-# print(f"{cost:.0%}")
+# lower_threshold = np.quantile(detector(cut(faulty, fault)), 1 - wanted)
+# print(f"false alarms: {np.mean(detector(cut(telemetry, later)) > lower_threshold):.0%}")
 # ```
 #
 # The detector ranks the fault's windows hardly above nominal ones, so no threshold helps.

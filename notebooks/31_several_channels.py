@@ -13,7 +13,8 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, drawing, say
+import pandas as pd
+from lesson_tools import check_answer, drawing
 from scipy.signal import lfilter
 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, REAL
@@ -82,12 +83,11 @@ noise = {
     "drawn jointly": draw_jointly(2_000, np.random.default_rng(1)),
     "drawn separately": draw_separately(2_000, np.random.default_rng(1)),
 }
-correlations = {"real": cross_correlation(new_residuals)} | {
-    name: cross_correlation(windows) for name, windows in noise.items()
-}
-say(
-    "Cross-correlation: " + ", ".join(f"{name} **{value:.2f}**" for name, value in correlations.items()) + "."
-)
+every = {"real": new_residuals} | noise
+correlations = {name: cross_correlation(windows) for name, windows in every.items()}
+table = pd.DataFrame({name: windows.std(axis=(0, 1)) for name, windows in every.items()}).T
+table.columns = ["sd of the first channel", "sd of the second"]
+print(table.assign(**{"cross-correlation": correlations}).round(2).to_string())
 assert abs(correlations["drawn jointly"] - correlations["real"]) < 0.1
 assert abs(correlations["drawn separately"]) < 0.1
 
@@ -95,15 +95,14 @@ assert abs(correlations["drawn separately"]) < 0.1
 title = f"Only noise drawn jointly keeps the channels' correlation of {correlations['real']:.2f}"
 alt = "Scatter of the residuals of two channels: real, drawn jointly, drawn separately"
 with drawing(alt, columns=3, height=2.4, title=title, sharex=True, sharey=True) as panels:
-    shown = ({"real": new_residuals} | noise).items()
-    for panel, (name, windows), color in zip(panels, shown, (REAL, ENHANCED, COARSE)):
+    for panel, (name, windows), color in zip(panels, every.items(), (REAL, ENHANCED, COARSE)):
         points = windows[:200, ::10].reshape(-1, 2)
         panel.plot(points[:, 0], points[:, 1], ".", color=color, markersize=2)
-        panel.set(xlabel="first channel", title=name)
-    panels[0].set_ylabel("second channel")
+        panel.set(xlabel="first channel (dimensionless)", title=name)
+    panels[0].set_ylabel("second channel (dimensionless)")
 
 # %% [markdown]
-# Each channel alone keeps its marginal: the points fill the same range in all three panels.
+# Each channel alone keeps its marginal, however the noise is drawn: its standard deviations nearly agree.
 #
 # ## A detector that sees both
 #
@@ -159,10 +158,10 @@ title = (
 alt = "Share of windows found with one channel of another time, for four detectors"
 with drawing(alt, height=1.7, title=title) as panel:
     colors = [COARSE, COARSE, ENHANCED, REAL]
-    bars = panel.barh(list(rates), [found for found, _ in rates.values()], color=colors)
-    panel.bar_label(bars, [f"{found:.0%}" for found, _ in rates.values()], padding=2, fontsize=7)
+    bars = panel.barh(list(rates), [100 * found for found, _ in rates.values()], color=colors)
+    panel.bar_label(bars, fmt="%.0f", padding=2, fontsize=7)
     panel.invert_yaxis()
-    panel.set(xlabel="windows found (thresholds set for 1 %)", xlim=(0, 1.05))
+    panel.set(xlabel="windows found (%; thresholds set for 1 %)", xlim=(0, 105))
 
 # %% [markdown]
 # *What to see:* the detector of each channel alone finds little more than its false alarms. Looking at both is not enough: trained on
@@ -170,8 +169,7 @@ with drawing(alt, height=1.7, title=title) as panel:
 # every window. Without a simulator it finds nearly as many here.
 
 # %%
-for name, (found, alarms) in rates.items():
-    print(f"{name:30} found {found:5.1%}   false alarms {alarms:5.1%}")
+print(pd.DataFrame(rates, index=["found", "false alarms"]).T.round(3).to_string())
 assert rates["both, noise drawn jointly"][0] > 0.5 > 0.1 > rates["both, noise drawn separately"][0]
 assert rates["each channel alone"][0] < 0.05 and rates["both, without a simulator"][0] > 0.5
 
@@ -180,11 +178,11 @@ assert rates["each channel alone"][0] < 0.05 and rates["both, without a simulato
 #
 # `fit` learns all columns of a file together: one enhancer, residual windows drawn for all channels at once, and detectors of all
 # channels. Its report compares the cross-correlation of the noise with that of two halves of real noise, and says how many injected
-# anomalies each detector finds, of one channel and of the *relation* between channels. Two of the five find no such relation.
+# anomalies each detector finds, of one channel and of the *relation* between channels. The *PCA residual* is that of notebook 13, and the
+# *innovation* is what a linear prediction from the past of all channels does not explain. The *largest step* and the *moving deviation*
+# look at each channel alone, and find no relation.
 
 # %%
-import pandas as pd
-
 from enhsim_tf import FitOptions, clean, fit, read_recording, read_source
 
 clock = pd.Index(np.arange(20_000.0), name="time")
@@ -200,18 +198,18 @@ print("\n".join(line for line in report.lines() if "correlation of the noise" in
 #
 # ## Exercises
 #
-# **1.** Another fault that no channel shows alone: the second channel is *late* by half a window. The next cell makes these residuals,
-# `delayed`. Give the share that the detector of noise drawn jointly finds.
+# **1.** Another fault that no channel shows alone: the second channel is *late* by a tenth of a window. The next cell makes these
+# residuals, `delayed`. Give the share that the detector of noise drawn jointly finds.
 
 # %%
-earlier = cut(telemetry, later - 50) - ridge.predict(cut(current, later - 50)).reshape(-1, window, 2)
+earlier = cut(telemetry, later - 10) - ridge.predict(cut(current, later - 10)).reshape(-1, window, 2)
 delayed = np.stack([new_residuals[:, :, 0], earlier[:, :, 1]], axis=2)
 share_late = None  # your answer
 
 # %%
 check_answer(
     share_late,
-    lambda share: 0.95 < share < 0.995,
+    lambda share: 0.77 < share < 0.83,
     "Score `delayed` with the detector of both channels and the threshold of the known residuals.",
 )
 
@@ -240,7 +238,7 @@ check_answer(
 # print(f"{share_late:.0%}")
 # ```
 #
-# It finds nearly as many windows as with a channel from another time: half a window is enough.
+# Most windows are found, although the delay is short; fewer than with a channel from another time.
 #
 # </details>
 
