@@ -31,8 +31,6 @@ from enhsim_tf.paper.claims import measured
 pipeline, budget = open_pipeline()
 
 # %% [markdown]
-# The text is about the full budget. With `ENHSIM_TF_BUDGET=smoke`, every step runs with small counts.
-#
 # ## The map
 #
 # The paper numbers nine steps. Dashed arrows run in training only.
@@ -222,7 +220,7 @@ say(
 assert budget == "smoke" or alarms["combined"] > 0.9 > 0.1 > alarms["telemetry"]
 
 # %% [markdown]
-# The next figure has two more detectors, more kinds of data, and faults to be found.
+# The next figure has two more detectors, more data, and faults to be found.
 #
 # - *Dense autoencoder*: the error with which a network reproduces a window from a few numbers.
 # - *Isolation forest*: how few random cuts separate a window's features from those of training windows.
@@ -238,7 +236,7 @@ rates, recall = (
 )
 with_gan = rates["enhanced + GAN noise"]
 too_many = int((with_gan > 0.1).sum())
-title = f"With GAN noise, {too_many} of {len(rates)} detectors exceed 10 % of false alarms"
+title = f"With GAN noise, {too_many} of {len(rates)} detectors exceed 10 % false alarms"
 show_detectors(rates, recall, title)
 
 # %% [markdown]
@@ -339,7 +337,6 @@ check_answer(
 # print(chosen_arm, f"finds {recall[chosen_arm].mean():.0%} of the faults, detectors trained on real data {recall['real'].mean():.0%}")
 # ```
 #
-# Gaussian noise is right here, since the real noise is white. All three alarm seldom after it, but the autoencoder finds fewer faults than
-# after real data: compare the recall, too.
+# Gaussian noise is right here, since the real noise is white. But compare the recall, too: the autoencoder then finds fewer faults.
 #
 # </details>

@@ -27,8 +27,8 @@ claim("C2")
 show(pipeline, "fig01_pipeline")
 
 # %% [markdown]
-# The curves in the boxes were computed with seed 0: one window of held-out time on its way through the networks, and real telemetry of the
-# same times beside the result. Solid arrows run whenever telemetry is made, dashed ones only in training.
+# The curves in the boxes were computed with seed 0: one window, of times on which nothing was trained, on its way through the networks, and
+# real telemetry of the same times beside the result. Solid arrows run whenever telemetry is made, dashed ones only in training.
 #
 # ## Step by step
 #
@@ -97,8 +97,7 @@ say(f"One second of computing makes **{rate:,.0f}** seconds of telemetry.")
 assert rate > 10_000
 
 # %% [markdown]
-# `python -m enhsim_tf.reproduce --telemetry my.csv` runs these steps on telemetry of your own. The tool (`python -m enhsim_tf fit my.csv`)
-# has a simulator with more choices: it fits the coarse simulator, and chooses the enhancer and the noise model by held-out telemetry.
+# `python -m enhsim_tf.reproduce --telemetry my.csv` runs these steps on telemetry of your own.
 #
 # **Answer.** One network turns square waves into a waveform, another turns random numbers into noise, and the two are added. Whether the
 # result is realistic is the question of notebooks 05 and 13, and whether the waveform of a fault is right, of notebook 23.

@@ -185,7 +185,7 @@ assert record["id"] == "C1"
 # %% [markdown]
 # ## Where it stops working
 #
-# The paper hopes that the enhancer also serves for faults that nobody recorded (C9). Here the amplitude falls from sample 125 on, in the
+# The paper hopes that the enhancer also serves for faults that nobody recorded. Here the amplitude falls from sample 125 on, in the
 # simulator as in the truth; there is one sample a second. At a *severity* of 0.5, half of the amplitude is lost. The slider changes the
 # severity. The picture shows one window; the errors are those over all windows.
 

@@ -185,8 +185,8 @@ for name, row in series.items():
 assert repeats["generated"] > {"full": 0.3, "smoke": 0.05}[budget] > abs(repeats["real"])
 
 # %% [markdown]
-# **Answer.** No. At a glance nothing shows. But a classifier has an AUC above 0.9, and windows of generated noise share a pattern: any two
-# of them are correlated, and real ones are not.
+# **Answer.** No. At a glance nothing shows. But a classifier has an AUC above 0.9, and windows of generated noise share a pattern: on
+# average, two of them are correlated, and two real ones are not.
 #
 # ## Exercises
 #

@@ -125,7 +125,7 @@ def draw(width):
         panels[0].set(xlabel="time (s)", ylabel="value (dimensionless)")
         panels[0].legend(frameon=False)
         panels[1].plot(extract(piece, width)[margin - half :][:500], color=REAL, linewidth=0.5)
-        panels[1].set(xlabel="time (s)", ylabel="difference (dimensionless)", ylim=(-0.8, 0.8))
+        panels[1].set(xlabel="time (s)", ylabel="rest (dimensionless)", ylim=(-0.8, 0.8))
 
 
 slider(draw, "width", range(3, 242, 2), shown=(25, 3, 121), unit="samples")

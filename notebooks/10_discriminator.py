@@ -232,8 +232,7 @@ with drawing(alt, height=1.7, title=title) as panel:
         panel.plot([floors[name], found[name]], [row, row], color=QUIET, linewidth=0.8)
     panel.plot(list(floors.values()), list(floors), "s", color=REAL, label="floor: real against real")
     panel.plot(list(found.values()), list(found), "o", color=GENERATED, label="generated against real")
-    panel.invert_yaxis()
-    panel.set(xlabel="AUC (0.5: cannot tell; 1: always right)", xlim=(0.4, 1.02))
+    panel.set(xlabel="AUC (0.5: cannot tell; 1: always right)", xlim=(0.4, 1.02), ylim=(2.5, -0.5))
     panel.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
 
 # %% [markdown]
