@@ -15,12 +15,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import ROOT, check_answer, claim, drawing, open_pipeline, say, show, slider
+from lesson_tools import check_answer, drawing, open_pipeline, save_film, say, show, slider
 
 from enhsim_tf.common.plot_style import GENERATED, REAL
 
 pipeline, budget = open_pipeline()
-claim("C4", "C5")
 
 # %%
 show(pipeline, "fig11_gan_training")
@@ -161,7 +160,7 @@ share = {iteration: windows.std(dtype=float) / real_sd for iteration, windows in
 
 # %%
 def draw(iteration):
-    title = f"After {iteration} iterations: {share[iteration]:.2f} times the real standard deviation"
+    title = f"After {iteration:,} iterations the noise has {share[iteration]:.2f} times the real size"
     with drawing(
         f"Real and generated noise after {iteration} iterations", 2, 1.7, title, sharey=True
     ) as panels:
@@ -175,7 +174,7 @@ recorded = list(frames)
 slider(draw, "iteration", recorded, shown=(recorded[0], recorded[len(recorded) // 5], recorded[-1]))
 
 # %% [markdown]
-# *What to see:* the noise of the untrained generator is far too large, and the generator learns first of all to make smaller noise.
+# *What to see:* after five iterations the noise is far too large, and the generator learns first of all to make smaller noise.
 
 # %%
 history = np.array(list(share.values()))
@@ -186,28 +185,10 @@ say(
 assert budget == "smoke" or (history[0] > 2 and abs(np.log(history[-1])) < 0.3)
 
 # %% [markdown]
-# The same as an animation, which the next cell writes at full budget:
+# The same as an animation:
 
 # %%
-import matplotlib.pyplot as plt
-from matplotlib.animation import FuncAnimation, PillowWriter
-
-if budget == "full":
-    figure, panel = plt.subplots(figsize=(5.6, 2.2), dpi=80, layout="constrained")
-    (line,) = panel.plot(frames[recorded[0]][0], color=GENERATED, linewidth=0.6)
-    panel.axhspan(-2 * real_sd, 2 * real_sd, color=REAL, alpha=0.12, linewidth=0, label="±2 sd of real noise")
-    panel.set(xlabel="time (s)", ylabel="noise (dimensionless)", ylim=(-1, 1), xlim=(0, 500))
-    panel.legend(frameon=False, loc="lower right")
-
-    def redraw(iteration):
-        line.set_ydata(frames[iteration][0])
-        panel.set_title(
-            f"The noise forms: iteration {iteration:,}", loc="left", fontweight="bold", fontsize=10
-        )
-
-    film = FuncAnimation(figure, redraw, recorded[::2] + recorded[-1:] * 5)
-    film.save(ROOT / "figures" / "noise_forming.gif", PillowWriter(fps=4))
-    plt.close(figure)
+save_film(frames, real_sd)  # writes the picture below, when the lessons are built
 
 # %% [markdown]
 # ![One window of generated noise, which shrinks during training into the band of the real noise](../figures/noise_forming.gif)
@@ -309,7 +290,7 @@ check_answer(
 #     return D
 # ```
 #
-# Early in training the discriminator is sure: D is near 0 for generated rows. There the maximised loss is flat and teaches nothing,
+# *If* the discriminator is sure, D is near 0 for generated rows. There the maximised loss is flat and teaches nothing,
 # while the reversed tags pull with full strength. Both have their optimum in the same place.
 #
 # </details>

@@ -21,7 +21,6 @@ from lesson_tools import check_answer, claim, degraded, drawing, open_pipeline, 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, QUIET, REAL
 
 pipeline, budget = open_pipeline()
-claim("C7")
 
 # %% [markdown]
 # ## The sum
@@ -38,7 +37,8 @@ real = held_out["target"]
 show(pipeline, "fig13_combined")
 
 # %% [markdown]
-# *What to see:* at a glance the orange line and the black one under it could be exchanged. Three numbers agree with the eye, too:
+# *What to see:* at a glance the orange line and the black one under it could be exchanged. Three numbers agree with the eye,
+# although a classifier tells them apart (notebook 05):
 
 
 # %%
@@ -63,17 +63,9 @@ if budget == "full":  # twenty iterations give noise of the wrong size
     assert abs(np.log(sizes)) < 0.1 and values < 0.05 and 0.8 < rough < 1.25
 
 # %% [markdown]
-# A classifier that looks at whole windows still tells them apart. (C7 asks only that it does so no better than for telemetry that is 10 %
-# larger.)
-
-# %%
-(record,) = verdict(pipeline, "C7")
-assert record["measured"]["auc"] > 0.8
-
-# %% [markdown]
 # ## A detector, built here
 #
-# What counts in the end is whether a detector can be trained on the sum. A simple and strong one is the *PCA residual*. It learns the 20
+# What counts in the end is whether a detector can be trained on the sum. A simple one is the *PCA residual*. It learns the 20
 # main directions $V$ in which nominal windows vary, and scores a window by what lies outside of them:
 #
 # $$s(x)=\mathrm{mean}\left((I-VV^\mathsf{T})(x-\bar x)\right)^2$$
@@ -110,7 +102,7 @@ def conformal_threshold(scores, rate):
 
 # %% [markdown]
 # Both are in the package. The threshold agrees exactly. The package's PCA uses a randomised solver, which finds the small directions
-# only approximately; the scores agree within a few per cent:
+# only approximately:
 
 # %%
 from enhsim_tf.detection.detectors import PCAResidual
@@ -119,6 +111,7 @@ from enhsim_tf.detection.metrics import threshold
 number = pipeline.settings.detector_windows
 training = pipeline.windows("train", number, "arms, real")["target"]
 scores, packaged = residual(fit_pca(training), real), PCAResidual().fit(training).score(real)
+say(f"Largest difference of the scores: **{np.abs(scores / packaged - 1).max():.1%}**.")
 np.testing.assert_allclose(scores, packaged, rtol=0.1)
 for rate in (0.01, 0.05, 0.3):
     np.testing.assert_allclose(conformal_threshold(scores, rate), threshold(scores, rate))
@@ -127,7 +120,8 @@ for rate in (0.01, 0.05, 0.3):
 # ## The test
 #
 # Five kinds of nominal windows train one detector each. Each threshold is set for 1 % on held-out windows of the *same* kind. Then all
-# watch real nominal telemetry of a later time. A kind of data that is good enough gives about 1 % there, too.
+# watch real nominal telemetry of a later time, and telemetry with a fault, a drift. A kind of data that is good enough gives about 1 % of
+# false alarms there, too, and a high recall.
 
 # %%
 noise_sd = pipeline.noise_windows("train", pipeline.settings.num_windows, "noise windows").std(dtype=float)
@@ -135,36 +129,29 @@ noise_sd = pipeline.noise_windows("train", pipeline.settings.num_windows, "noise
 
 def kinds_of(purpose):
     coarse = pipeline.windows("train", number, purpose)["coarse"]
-    enhanced, rng = (
-        pipeline.enhance(coarse),
-        np.random.default_rng(int(pipeline.draw(purpose).integers(2**31))),
-    )
+    enhanced, rng = pipeline.enhance(coarse), pipeline.draw(f"noise, {purpose}")
     return {
         "coarse": coarse,
         "enhanced": enhanced,
-        "enhanced + GAN noise": enhanced
-        + pipeline.generate_noise(number, pipeline.draw(f"noise, {purpose}")),
+        "enhanced + GAN noise": enhanced + pipeline.generate_noise(number, rng),
         "enhanced + Gaussian noise": enhanced + noise_sd * rng.standard_normal(enhanced.shape),
     }
 
 
 training_windows, threshold_windows = kinds_of("arms, training"), kinds_of("arms, threshold")
 training_windows["real"] = training
-threshold_windows["real"] = pipeline.windows("calibration", None)["target"]
+threshold_windows["real"] = pipeline.windows("calibration")["target"]
 
-rates = {}
+_, drifting = degraded(pipeline, "drift", 0.1)
+faulty = drifting + pipeline.settings.noise_sd * np.random.default_rng(9).standard_normal(drifting.shape)
+
+rates, recalls, limits, scores_of_real = {}, {}, {}, {}
 for kind, windows in training_windows.items():
     model = fit_pca(windows)
-    limit = conformal_threshold(residual(model, threshold_windows[kind]), 0.01)
-    rates[kind] = np.mean(residual(model, real) > limit)
-
-from enhsim_tf.paper.claims import measured
-
-found = measured("detection", pipeline)  # the same test in the reproduction, whose first detector is this one
-reproduced = [found[f"false alarms, {kind}, PCA residual"] for kind in rates]
-np.testing.assert_allclose(
-    list(rates.values()), reproduced, atol={"full": 0.05, "smoke": 1.0}[budget]
-)  # few windows at smoke
+    limits[kind] = conformal_threshold(residual(model, threshold_windows[kind]), 0.01)
+    scores_of_real[kind] = residual(model, real)
+    rates[kind] = np.mean(scores_of_real[kind] > limits[kind])
+    recalls[kind] = np.mean(residual(model, faulty) > limits[kind])
 
 # %%
 alt = "False-alarm rate of the PCA residual on real nominal telemetry, by the data that it was trained on"
@@ -172,7 +159,7 @@ title = "The sum looks right, but a detector trained on it flags telemetry"
 colors = {"coarse": COARSE, "enhanced": ENHANCED, "enhanced + GAN noise": GENERATED, "real": REAL}
 with drawing(alt, height=1.9, title=title) as panel:
     bars = panel.barh(list(rates), list(rates.values()), color=[colors.get(kind, QUIET) for kind in rates])
-    panel.bar_label(bars, [f"{rate:.1%}" for rate in rates.values()], padding=3)
+    panel.bar_label(bars, [f"{100 * rate:.1f} %" for rate in rates.values()], padding=9)
     panel.axvline(0.01, color=REAL, linestyle=":", linewidth=0.8)
     panel.set(xlabel="false-alarm rate on real nominal windows (dotted: 1 %, the target)", xlim=(0, 1.1))
     panel.set_xticks([0, 0.5, 1], ["0 %", "50 %", "100 %"])
@@ -180,15 +167,28 @@ with drawing(alt, height=1.9, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the detector that was trained on the paper's sum is as useless as the one that was trained without noise, although a plot
-# shows hardly any difference to telemetry. Gaussian noise of the same standard deviation takes one line and is good enough here, where the
-# real noise is white. Rates differ a little between notebooks, which draw other windows. *Coarse* alarms seldom because its threshold is
-# too high (notebook 22).
+# shows hardly any difference to telemetry. After Gaussian noise of the same standard deviation, which takes one line, it alarms about as
+# seldom as after real data, and finds the drift about as often. After *coarse* it alarms never, because its threshold lies above the scores
+# of all real windows. (Rates differ a little between notebooks, which draw other windows.)
 
 # %%
-say(", ".join(f"{kind}: **{rate:.1%}**" for kind, rate in rates.items()) + ".")
+say("False alarms: " + ", ".join(f"{kind} **{rate:.1%}**" for kind, rate in rates.items()) + ".")
+good = ["enhanced + Gaussian noise", "real"]
+say("Recall: " + ", ".join(f"{kind} **{recalls[kind]:.0%}**" for kind in good) + ".")
+largest = scores_of_real["coarse"].max()
+say(f"*Coarse*: threshold **{limits['coarse']:.3f}**, largest score of a real window **{largest:.3f}**.")
 if budget == "full":
     assert rates["enhanced"] > 0.9 and rates["enhanced + GAN noise"] > 0.9
     assert rates["enhanced + Gaussian noise"] < 0.05 and rates["real"] < 0.05
+    assert limits["coarse"] > largest and abs(recalls[good[0]] - recalls[good[1]]) < 0.1
+
+# %% [markdown]
+# The paper says itself that the signal without noise is too clean (C3). Its verdict rests on three detectors:
+
+# %%
+claim("C3")
+(record,) = verdict(pipeline, "C3")
+assert budget == "smoke" or record["verdict"] == "reproduced"
 
 # %% [markdown]
 # Generated noise varies in few dimensions (notebook 09). Twenty directions hold most of it, and the detector learns that little lies
@@ -225,25 +225,38 @@ def scores_at(scale):
 
 def draw(scale):
     own, of_real = scores_at(scale)
-    limit = conformal_threshold(own, 0.01)
-    limit = (
-        own.max() if np.isinf(limit) else limit
-    )  # few windows, as at smoke budget, allow no threshold of 1 %
+    limit = min(conformal_threshold(own, 0.01), own.max())  # few windows, as at smoke budget, allow no 1 %
     title = f"{scale} times the real noise: {np.mean(of_real > limit):.1%} of real windows raise an alarm"
-    bins = np.linspace(min(own.min(), of_real.min()), max(own.max(), of_real.max()), 80)
+    bins = np.linspace(0.006, 0.019, 120)
     with drawing(f"Scores with noise of {scale} times the real scale", height=1.6, title=title) as panel:
         panel.hist(own, bins, color=ENHANCED, alpha=0.5, label="same kind")
         panel.hist(of_real, bins, histtype="step", color=REAL, label="real nominal")
         panel.axvline(limit, color=REAL, linestyle=DASHED, linewidth=0.8, label="threshold")
-        panel.set(xlabel="score (dimensionless)", ylabel="windows")
-        panel.legend(frameon=False, loc="upper right")
+        panel.set(xlabel="score (dimensionless)", ylabel="windows", xlim=(bins[0], bins[-1]))
+        panel.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
 
 
-slider(draw, "noise's scale", [0.25, 0.5, 0.75, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0], shown=(1.0, 0.9, 1.25))
+slider(draw, "noise's scale", [0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.25], shown=(1.0, 0.9, 1.25))
+
+# %% [markdown]
+# *What to see:* noise of the real size is right. With a tenth less, most real windows raise an alarm: the detector is useless. With a
+# quarter more, none does.
+
+# %%
+share = {}
+for scale in (0.9, 1.0, 1.25):
+    own, of_real = scores_at(scale)
+    share[scale] = np.mean(of_real > conformal_threshold(own, 0.01))
+say(
+    "Alarms: "
+    + ", ".join(f"**{rate:.1%}** at {scale}" for scale, rate in share.items())
+    + " times the noise."
+)
+assert budget == "smoke" or (share[0.9] > 0.5 and share[1.0] < 0.05 and share[1.25] < 0.001)
 
 # %% [markdown]
 # **Answer.** Not with the paper's noise: a detector that looks outside the main directions then alarms on every nominal window. With
-# Gaussian noise of the right size, here, yes.
+# Gaussian noise of the right size, it alarms about as seldom, and finds a drift about as often, as after real data.
 #
 # ## Exercises
 #
@@ -260,14 +273,11 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** Too much noise gives few false alarms. What does it cost? Complete the function with the *recall*: the share of real windows
-# with a fault (here a drift) whose score exceeds the threshold, for a detector trained with noise of a given scale.
+# **2.** Too much noise gives few false alarms. What does it cost? Complete the function with the recall of the drift, `faulty`, for a
+# detector trained with noise of a given scale.
+
 
 # %%
-_, drifting = degraded(pipeline, "drift", 0.1)
-faulty = drifting + pipeline.settings.noise_sd * np.random.default_rng(9).standard_normal(drifting.shape)
-
-
 def recall_at(scale):
     training, calibration = (windows + scale * noise_sd * draw for windows, draw in zip(enhanced, draws))
     # your code: fit the detector, set a threshold for 5 %, and return the recall of `faulty`
@@ -275,16 +285,19 @@ def recall_at(scale):
 
 
 # %%
-def by_package(scale):
-    training, calibration = (windows + scale * noise_sd * draw for windows, draw in zip(enhanced, draws))
-    detector = PCAResidual().fit(training)
-    return np.mean(detector.score(faulty) > threshold(detector.score(calibration), 0.05))
+from notebooks import answers_paper
 
-
-recalls = [recall_at(scale) for scale in (1.0, 1.25)]
+both = [recall_at(scale) for scale in (1.0, 1.25)]
 check_answer(
-    None if recalls[0] is None else recalls,
-    lambda found: np.allclose(found, [by_package(1.0), by_package(1.25)], atol=0.1),
+    None if both[0] is None else both,
+    lambda found: np.allclose(
+        found,
+        [
+            answers_paper.recall_with_noise(enhanced, scale * noise_sd * draws, faulty)
+            for scale in (1.0, 1.25)
+        ],
+        atol=0.1,
+    ),
     "model = fit_pca(training); the threshold comes from residual(model, calibration).",
 )
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib.figure
 import matplotlib.style
 from IPython.display import Markdown, display
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,9 +27,9 @@ if str(ROOT) not in sys.path:
 
 from enhsim_tf.common import figure
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.plot_style import STYLE
+from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED, QUIET, REAL, STYLE
 from enhsim_tf.common.stages import Stages, default_cache
-from enhsim_tf.paper.claims import CLAIMS, degraded_windows, judge
+from enhsim_tf.paper.claims import BASIC, CLAIMS, OURS, WHOLE, degraded_windows, judge
 from enhsim_tf.paper.figures import DRAWINGS, FIGURES
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.report import needed, short
@@ -46,6 +47,7 @@ STATIC = (
 NOT_ANSWERED, RIGHT, NOT_YET = "Not yet answered.", "Right.", "Not yet."
 _SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
 _LEDGER = {known.id: known for known in CLAIMS}
+_PART = {BASIC: "", WHOLE: " (to hold in full)", OURS: " (shown, does not decide)"}  # of a limit in a verdict
 
 
 # -- the pipeline ------------------------------------------------------------------------------------------------------------
@@ -110,19 +112,25 @@ def claim(*ids: str) -> None:
         display(Markdown(f"> **{known.id}** (paper, {place}): {known.sentence}"))
 
 
-def verdict(pipeline: Pipeline, *ids: str) -> list[dict[str, Any]]:
-    """Evaluates claims, and displays each verdict with the limits that decide it.
+def verdict(pipeline: Pipeline, *ids: str, limits: bool = True) -> list[dict[str, Any]]:
+    """Evaluates claims, and displays each verdict with its limits.
+
+    Args:
+        pipeline: As `open_pipeline` returns it.
+        *ids: C1 to C9.
+        limits: Whether the limits are displayed, too, each with its part in the verdict.
 
     Returns:
         The records as `results.json` stores them.
     """
     records = [judge(_LEDGER[id], _LEDGER[id].measure(pipeline)) for id in ids]
     for record in records:
-        limits = "".join(
-            f"\n> - {limit['words']}: {short(limit['value'])}, needed {needed(limit)}"
+        lines = "".join(
+            f"\n> - {limit['words']}: {short(limit['value'])}, needed {needed(limit)}{_PART[limit['decides']]}"
             for limit in record["limits"]
+            if limits
         )
-        display(Markdown(f"> **{record['id']}: {record['verdict']}.**\n{limits}"))
+        display(Markdown(f"> **{record['id']}: {record['verdict']}.**\n{lines}"))
     return records
 
 
@@ -180,6 +188,57 @@ def drawing(
         picture = io.BytesIO()
         canvas.savefig(picture, format="png", metadata={"Software": None})
     _show_picture(picture.getvalue(), alt)
+
+
+def show_detectors(rates: "pd.DataFrame", recall: "pd.DataFrame", title: str) -> None:
+    """Shows false-alarm rates and recall, both with a row for each detector and a column for each kind of training data."""
+    colors = {"coarse": COARSE, "enhanced": ENHANCED, "enhanced + GAN noise": GENERATED, "real": REAL}
+    alt = "False-alarm rate and recall of three detectors by the data they were trained on"
+    shown = {"false alarms: share of nominal windows": rates, "recall: share of faulty windows": recall}
+    with drawing(alt, 2, 2.8, title, sharey=True) as panels:
+        for panel, (name, shares) in zip(panels, shown.items()):
+            for number, (detector, marker) in enumerate(zip(shares.index, "os^")):
+                for row, kind in enumerate(shares.columns):
+                    style = {"color": colors.get(kind, QUIET), "markersize": 4.5, "clip_on": False}
+                    label = detector if kind == "real" and panel is panels[0] else None
+                    panel.plot(
+                        shares.loc[detector, kind], row + 0.22 * (number - 1), marker, **style, label=label
+                    )
+            panel.set(xlabel=name, xlim=(0, 1), yticks=range(len(shares.columns)), yticklabels=shares.columns)
+            panel.set_xticks([0, 0.5, 1], ["0 %", "50 %", "100 %"])
+            panel.grid(axis="y", linewidth=0.3)
+        panels[0].axvline(0.01, color=REAL, linestyle=":", linewidth=0.8)
+        panels[0].invert_yaxis()
+        panels[0].figure.legend(frameon=False, loc="outside lower center", ncols=3)
+
+
+def save_film(frames: "dict[int, np.ndarray]", real_sd: float) -> None:
+    """Writes `figures/noise_forming.gif`, when a lesson is executed at full budget to be read.
+
+    Args:
+        frames: Generated windows by the number of iterations; the film shows the first of each.
+        real_sd: Standard deviation of the real noise.
+    """
+    if not os.environ.get(STATIC) or os.environ.get(BUDGET, FULL) != FULL:
+        return
+    from matplotlib.animation import FuncAnimation, PillowWriter
+
+    canvas = matplotlib.figure.Figure(figsize=(5.6, 2.2), dpi=80, layout="constrained")
+    panel, recorded = canvas.subplots(), list(frames)
+    (line,) = panel.plot(frames[recorded[0]][0], color=GENERATED, linewidth=0.6)
+    panel.axhspan(-2 * real_sd, 2 * real_sd, color=REAL, alpha=0.12, linewidth=0, label="±2 sd of real noise")
+    panel.set(xlabel="time (s)", ylabel="noise (dimensionless)", ylim=(-1, 1), xlim=(0, 500))
+    panel.legend(frameon=False, loc="lower right")
+
+    def redraw(iteration: int) -> None:
+        line.set_ydata(frames[iteration][0])
+        panel.set_title(
+            f"The noise forms: iteration {iteration:,}", loc="left", fontweight="bold", fontsize=10
+        )
+
+    FigureCanvasAgg(canvas)  # which an animation draws on
+    film = FuncAnimation(canvas, redraw, recorded[::2] + recorded[-1:] * 5)
+    film.save(ROOT / "figures" / "noise_forming.gif", PillowWriter(fps=4))
 
 
 def _show_picture(png: bytes, alt: str) -> None:

@@ -165,14 +165,18 @@ def test_what_a_lesson_tells_to_see_is_asserted(source):
             assert any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(following))), cell.source
 
 
-def test_a_claim_has_the_same_numbers_in_every_lesson():
-    said = {}
+def test_a_claim_has_the_same_verdict_and_numbers_in_every_lesson():
+    verdicts, numbers = {}, {}
     for source in SOURCES:
         for cell in build.code_cells(nbformat.read(source.with_suffix(".ipynb"), as_version=4)):
             for output in cell.outputs:
-                if found := re.match(r"> \*\*(C\d): ", output.get("data", {}).get("text/markdown", "")):
-                    said.setdefault(found[1], set()).add(output["data"]["text/markdown"])
-    assert len(said) == 9 and all(len(texts) == 1 for texts in said.values())
+                text = output.get("data", {}).get("text/markdown", "")
+                if found := re.match(r"> \*\*(C\d): (.*?)\.\*\*", text):
+                    verdicts.setdefault(found[1], set()).add(found[2])
+                    if limits := text[found.end() :].strip():  # a lesson may leave them out
+                        numbers.setdefault(found[1], set()).add(tuple(re.findall(r"\d[\d,.]*", limits)))
+    assert len(verdicts) == 9
+    assert all(len(each) == 1 for each in (*verdicts.values(), *numbers.values()))
 
 
 def test_every_figure_and_every_claim_of_the_paper_is_taught():
