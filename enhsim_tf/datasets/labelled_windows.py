@@ -1,6 +1,5 @@
 """Labelled training data: windows, or one continuous series, with labels that mark exactly the samples that a scenario has changed."""
 
-import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,33 +12,10 @@ from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_s
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import parquet_options, series_table, window_schema, window_table
-from enhsim_tf.datasets.places import parse_start
+from enhsim_tf.datasets.places import Share, parse_start
 from enhsim_tf.detection.anomalies import TRIES, draw_begin
 from enhsim_tf.simulator.changes import fade_length
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-
-
-@dataclasses.dataclass(frozen=True)
-class Share:
-    """A part of a training set: windows of one scenario, or nominal ones, with a random seed of their own."""
-
-    scenario: Degraded | None
-    num_windows: int
-    seed: int
-
-
-def divide_windows(scenarios: Sequence[Degraded], nominal_share: float, num_windows: int, seed: int) -> list[Share]:
-    """Divides windows between nominal telemetry and scenarios. Scenarios get equal numbers; the first ones get the remainder."""
-    num_nominal = round(nominal_share * num_windows) if scenarios else num_windows
-    each, left = divmod(num_windows - num_nominal, len(scenarios) or 1)
-    counts = [num_nominal, *(each + (number < left) for number in range(len(scenarios)))]
-    if scenarios and nominal_share < 1 and counts[-1] == 0:
-        raise InputError(
-            f"Expected at least one window for each of {len(scenarios)} scenarios. Received: {num_windows} windows, of which a share of "
-            f"{nominal_share:g} is nominal. Ask for more windows."
-        )
-    seeds = np.random.SeedSequence(seed).generate_state(len(counts)).tolist()
-    return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
 def write_windows_labelled(path: str | os.PathLike, simulator: EnhancedSimulator, shares: Sequence[Share]) -> dict[Degraded, int]:

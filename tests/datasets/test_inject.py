@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.datasets.inject import JOINT_KINDS, InjectOptions, inject_channel, inject_joint, join_injected
+from enhsim_tf.datasets.inject import inject_channel, inject_joint, join_injected
+from enhsim_tf.datasets.inject_options import JOINT_KINDS, InjectOptions
 from enhsim_tf.datasets.label_columns import LABELS, series_table, write_table
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.series import Telemetry

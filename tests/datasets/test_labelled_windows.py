@@ -10,7 +10,8 @@ import pytest
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, ScheduledMode
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.label_columns import LABELS, write_table
-from enhsim_tf.datasets.labelled_windows import Share, divide_windows, series_labelled, write_windows_labelled
+from enhsim_tf.datasets.labelled_windows import series_labelled, write_windows_labelled
+from enhsim_tf.datasets.places import Share, divide_windows
 from tests.known_simulators import of_waves
 
 WINDOW = 60
