@@ -9,7 +9,7 @@ from enhsim_tf.simulator.options import FitOptions, ScoreOptions, options_from
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 
 _OF_RUNS = "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values"
-_NOT_OF_RUNS = "windows continuous start scenario at number gap timeeval nominal_share workers engine scenarios".split()
+_NOT_OF_RUNS = "windows continuous start scenario at number timeeval nominal_share workers engine scenarios".split()
 _MOST_EVENTS = 10_000
 
 
@@ -57,7 +57,7 @@ def _check_inject(options: argparse.Namespace) -> None:
     except ValueError:
         raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
     length = split_limits("length", options.length)
-    options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.gap, options.noise_sd, options.seed)
+    options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed)
     options.cleaning = cleaning_options(options, 3)
 
 
@@ -71,7 +71,7 @@ def _check_generate(options: argparse.Namespace) -> None:
     if options.scenarios is not None:
         _refuse(options, "with --scenarios, whose file gives them", "scenario", "nominal_share")
     if options.continuous is None:
-        _refuse(options, "without --continuous", "start", "at", "number", "gap", "timeeval")
+        _refuse(options, "without --continuous", "start", "at", "number", "timeeval")
         if options.windows is None and options.scenarios is None:
             raise InputError("Expected --windows or --continuous. Received: neither. Give one of them.")
     else:

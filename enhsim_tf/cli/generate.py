@@ -65,7 +65,7 @@ def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, pat
         index, lengths = series_index(length, interval_s, options.start), length_limits(options.length, interval_s)
         given = [ScheduledMode(place.kind, place.severity, *place.samples(index, interval_s)) for place in options.at]
         rng = np.random.default_rng([seed, 3])
-        schedule = draw_schedule(simulator, length, given, options.scenario, options.number or 0, lengths, options.gap, rng)
+        schedule = draw_schedule(simulator, length, given, options.scenario, options.number or 0, lengths, rng)
     elif options.scenario:
         (scenario,) = options.scenario
     frame = series_labelled(simulator, length, scenario, seed, options.start, schedule)

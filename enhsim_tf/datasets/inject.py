@@ -54,7 +54,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.Dat
     for place in map(checked_place, options.at):
         severity = draw_between(options.severity, rng) if place.severity is None else place.severity
         given.append(Anomaly(place.kind, severity, *place.samples(index, interval_s)))
-    gap = max([length for *_, length in drawn], default=0) if options.gap is None else options.gap
+    gap = max([length for *_, length in drawn], default=0)
     changed, mask, anomalies = inject_anomalies(values, given, drawn, noise_sd, gap, rng)
     events = [(each.kind, each.severity, each.begin, each.end) for each in anomalies]
     frame = series_table(changed[:, None], mask[:, None], [parts[0].name], events, index)
@@ -98,7 +98,7 @@ def inject_joint(telemetry: Recording, options: InjectOptions) -> pd.DataFrame:
     found: list[tuple[str, float, int, int, str]] = []
     for kind, length in sorted(drawn, key=lambda each: -each[1]):
         taken = [(begin, end) for _, _, begin, end, _ in found]
-        begin = draw_begin(bounds, taken, length, longest if options.gap is None else options.gap, rng)
+        begin = draw_begin(bounds, taken, length, longest, rng)
         is_common, here = kind == "common_shift", slice(begin, begin + length)
         degree = draw_between(options.severity, rng) if is_common else 1.0
         channel = int(rng.integers(values.shape[1]))

@@ -24,7 +24,6 @@ class InjectOptions:
         number: Number of anomalies whose places are drawn. None: one of each kind.
         at: Anomalies at given places, `KIND[:SEVERITY]@BEGIN/LENGTH`. BEGIN is a sample number or a time. The severity is drawn if it
             is not given.
-        gap: Least number of samples between a drawn anomaly and any other. None: the length of the longest drawn anomaly.
         noise_sd: Standard deviation of the noise, in the unit of the channel. None: `anomalies.estimate_noise_sd`.
         seed: Random seed. Each channel draws from its own generator, which depends on the seed and the name of the channel.
 
@@ -37,7 +36,6 @@ class InjectOptions:
     length: tuple[str, str] = ("100", "100")
     number: int | None = None
     at: Sequence[str] = ()
-    gap: int | None = None
     noise_sd: float | None = None
     seed: int = 0
 
@@ -63,8 +61,6 @@ class InjectOptions:
             raise InputError(f"Expected kinds of anomaly or places. Received: neither. Give --kinds, of {', '.join(INJECTIONS)}, or --at.")
         if self.number is not None and (not 1 <= self.number <= _MOST or not self.kinds):
             raise InputError(f"Expected 1 to {_MOST:,} anomalies with drawn places, of given kinds. Received: number={self.number}.")
-        if self.gap is not None and self.gap < 0:
-            raise InputError(f"Expected a gap of 0 or more samples. Received: gap={self.gap}.")
         if self.noise_sd is not None and not 0 < self.noise_sd < np.inf:
             raise InputError(f"Expected a standard deviation of the noise above 0. Received: noise_sd={self.noise_sd}.")
         for text in self.length:

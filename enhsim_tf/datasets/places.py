@@ -25,13 +25,14 @@ def parse_scenario(text: str) -> Degraded:
     """Parses `mode:severity` or `mode:severity:onset`, such as `stuck:0.5`, with `CHANNEL=` before it for one of several channels."""
     channel, is_named, rest = text.rpartition("=")
     mode, *numbers = rest.split(":")
-    if mode not in MODES or not 1 <= len(numbers) <= 2:
-        raise InputError(f"Expected mode:severity or mode:severity:onset, mode one of {', '.join(MODES)}. Received: {text!r}.")
     try:
-        values = [float(number) for number in numbers]
+        severity, onset = map(float, numbers if len(numbers) == 2 else [*numbers, Degraded.onset])
+        return Degraded(mode, severity, onset, channel if is_named else None)
     except ValueError:
-        raise InputError(f"Expected numbers from 0 to 1 after the mode. Received: {text!r}. Write for example {mode}:0.5.") from None
-    return Degraded(mode, *values, channel=channel if is_named else None)
+        raise InputError(
+            f"Expected mode:severity or mode:severity:onset with numbers from 0 to 1, such as stuck:0.5, mode one of: {', '.join(MODES)}. "
+            f"Received: {text!r}."
+        ) from None
 
 
 def parse_length(text: str) -> tuple[float, str]:

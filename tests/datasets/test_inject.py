@@ -99,7 +99,6 @@ def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refuse
         {"kinds": ["ramp"], "length": ("long", "long")},
         {"kinds": ["ramp"], "number": 0},
         {"at": ["ramp@1/5"], "number": 3},
-        {"kinds": ["ramp"], "gap": -1},
         {"kinds": ["ramp"], "noise_sd": 0},
         {"at": ["ramp"]},
         {"at": ["rust:4@5/5"]},

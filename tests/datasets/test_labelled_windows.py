@@ -92,15 +92,6 @@ def test_windows_that_a_scenario_does_not_change_are_labelled_nominal_and_counte
     assert ((frame["scenario"] == "nominal").to_numpy() == same).all()
 
 
-def test_an_onset_after_the_last_sample_is_refused(tmp_path, refused):
-    late = Degraded("friction", 0.5, 1 - 1e-9)
-    with refused("onset within 60 samples"):
-        write_windows_labelled(tmp_path / "x.parquet", known(), [Share(late, 5, 1)])
-    with refused("onset within 30 samples"):
-        series_labelled(known(), 30, late)
-    assert not list(tmp_path.iterdir())
-
-
 def test_other_programs_can_read_the_file(written):
     path, _ = written
     schema = pq.read_schema(path)
