@@ -65,9 +65,6 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     if out.suffix and not is_folder:
         raise InputError(f"Expected a file that ends in {' or '.join(suffixes)}, or a folder. Received: --out {out}.")
     paths = {name: folder_of(out, name).with_suffix(suffixes[0]) for name in names}
-    for path in paths.values():
-        if os.path.isdir(path):
-            raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Give another --out.")
     make_folder(out)
     return paths
 

@@ -166,22 +166,3 @@ def test_a_series_with_a_start_has_times():
     expected = pd.date_range("2024-02-28T23:59:59", periods=1_000, freq="100ms", tz="UTC")
     assert (frame.index == expected).all()  # to the nanosecond
     assert (frame["scenario"].iloc[:500] == "nominal").all() and (frame["scenario"].iloc[500:] == "stuck").any()
-
-
-# failures
-
-
-@pytest.mark.parametrize("there_before", [False, True])
-def test_a_failed_generation_writes_nothing(tmp_path, monkeypatch, there_before):
-    broken = known()
-
-    def chunks(*arguments):  # fails after the first windows
-        yield np.zeros((3, WINDOW, 1), np.float32), np.zeros((3, WINDOW, 1), bool)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(broken, "generate_labelled_chunks", chunks)
-    if there_before:
-        (tmp_path / "x.parquet").write_text("the old one")
-    with pytest.raises(KeyboardInterrupt):
-        write_windows_labelled(tmp_path / "x.parquet", broken, [Share(None, 10, 0)])
-    assert [path.read_text() for path in tmp_path.iterdir()] == ["the old one"] * there_before
