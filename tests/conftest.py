@@ -32,27 +32,14 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leaves the slow tests out, unless they are asked for."""
+    """Leaves the slow tests out, unless they are asked for, and gives each file or folder to one process."""
     if not config.getoption(SLOW):
         left = [item for item in items if item.get_closest_marker("slow")]
         config.hook.pytest_deselected(items=left)
         items[:] = [item for item in items if item not in left]
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """Gives the files of a folder whose fixtures take seconds to one process, and all other files one by one."""
-    if config.getvalue("dist") != "loadfile":
-        return None
-    from xdist.scheduler import LoadFileScheduling
-
-    class ByFolder(LoadFileScheduling):
-        def _split_scope(self, nodeid):
-            file = super()._split_scope(nodeid)
-            folder = file.split("/")[-2] if "/" in file else ""
-            return folder if folder in TOGETHER else file
-
-    return ByFolder(config, log)
+    for item in items:
+        folder = item.path.parent.name
+        item.add_marker(pytest.mark.xdist_group(folder if folder in TOGETHER else item.nodeid.partition("::")[0]))
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -19,7 +19,7 @@ from enhsim_tf.common.atomic_files import sha256, write_json
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import read_json
 from enhsim_tf.datasets.mix import MOST_WINDOWS
-from enhsim_tf.datasets.plan import FORMAT, MOST_VALUES, Plan
+from enhsim_tf.datasets.plan import FORMAT, Plan
 from enhsim_tf.datasets.shard import Record, shard_file
 
 MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of Parquet folders skip such names
@@ -66,28 +66,17 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Reads and validates the manifest of a data set. Its `shards` are returned as `Record`s, or None if it is not finished."""
     try:
         content = read_json(folder / MANIFEST, _MOST_BYTES)
-        if content["format"] != FORMAT:
-            raise InputError(
-                f"Expected a data set of the format {FORMAT}. Received: {str(content['format'])[:80]!r} in {folder}. Generate it again in another --out."
-            )
         settings, shards = content["settings"], content["shards"]
-        counts = [settings["windows"], settings["shard"], settings["window"]]
-        are_counts = all(type(count) is int and 1 <= count <= MOST_WINDOWS for count in counts) and counts[2] <= MOST_VALUES
-        if not are_counts or type(settings["interval_s"]) is not float or not isinstance(settings["models"], list):
-            raise ValueError("settings that no data set has")
-        if any(each["file"] != shard_file(number) for number, each in enumerate(shards or ())):
-            raise ValueError("other files than those of a data set")
-        records = [_record_of(number, each["rows"], each["sha256"]) for number, each in enumerate(shards or ())]
-        content["shards"] = None if shards is None else records
-    except FileNotFoundError:
-        raise InputError(f"Expected a data set written by `generate`. Received: {folder}, without a {MANIFEST}.") from None
-    except InputError:
-        raise
+        are_counts = all(type(settings[name]) is int and 1 <= settings[name] <= MOST_WINDOWS for name in ("windows", "shard"))
+        if content["format"] != FORMAT or not are_counts:
+            raise ValueError(f"format or settings of something else: {str(content['format'])[:80]}")
+        if shards is not None:
+            content["shards"] = [_record_of(number, each["rows"], each["sha256"]) for number, each in enumerate(shards)]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        reason = " ".join(str(error).split())[:80]
+        reason = f"{type(error).__name__}: {' '.join(str(error).split())[:120]}"
         raise InputError(
-            f"Expected an undamaged {MANIFEST}. Received: a damaged one in {folder} ({type(error).__name__}: {reason}). "
-            "Remove the folder, or give another, and run `generate` again."
+            f"Expected a data set of `generate` of the format {FORMAT}. Received: {folder}, whose {MANIFEST} is missing, damaged or another "
+            f"one ({reason}). Give another folder, or remove this one and run `generate` again."
         ) from None
     return content
 

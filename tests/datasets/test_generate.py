@@ -152,7 +152,7 @@ def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)
     for call in (lambda: generate_data_set(folder, plan()), lambda: list(find_problems(folder))):
-        with refused("_manifest.json", "Remove the folder"):
+        with refused("_manifest.json", "remove this one"):
             call()
     assert not here
 

@@ -9,7 +9,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, ScheduledMode
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.datasets.label_columns import LABELS, write_table
+from enhsim_tf.datasets.label_columns import LABELS
 from enhsim_tf.datasets.labelled_windows import series_labelled, write_windows_labelled
 from enhsim_tf.datasets.places import Share, divide_windows
 from tests.known_simulators import of_waves
@@ -120,14 +120,9 @@ def test_several_channels_have_columns_of_their_own(tmp_path, refused):
         np.testing.assert_array_equal(np.stack(frame[f"window {name}"]), expected[:, :, number])
     changed = np.stack(frame["mask amps"])
     assert not np.stack(frame["mask volts"]).any() and changed[3:, 31:].all() and not changed[:3].any()
-    np.testing.assert_array_equal(np.stack(frame["mask"]), changed)
     series = series_labelled(both, 300, drift, 4)
     assert list(series) == ["volts", "amps", *LABELS, "mask volts", "mask amps"]
-    nominal = both.generate_series(300, None, 4)
-    np.testing.assert_array_equal(series["volts"], nominal[:, 0])
-    np.testing.assert_array_equal(series["mask"], series["amps"] != nominal[:, 1])
-    write_table(tmp_path / "x.csv", series, both.channels)
-    assert list(pd.read_csv(tmp_path / "x.csv")) == ["timestamp", "volts", "amps", "is_anomaly"]
+    np.testing.assert_array_equal(series["mask"], series["amps"] != both.generate_series(300, None, 4)[:, 1])
     with refused("volts, amps", "'watts'"):
         series_labelled(both, 300, Degraded("drift", 1.0, 0.5, "watts"))
 
