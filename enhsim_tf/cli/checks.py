@@ -82,7 +82,7 @@ def _check_generate(options: argparse.Namespace) -> None:
     if not 0 <= options.nominal_share <= 1:
         raise InputError(f"Expected a nominal share from 0 to 1. Received: {options.nominal_share}.")
     options.workers = parse_workers(options.workers, options.engine)
-    from enhsim_tf.datasets.places import divide_windows, parse_scenario
+    from enhsim_tf.datasets.places import divide_windows, parse_scenario  # imports NumPy, so it comes last
 
     options.scenario = [parse_scenario(text) for text in options.scenario]
     if options.continuous is not None:
