@@ -10,7 +10,8 @@ from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.backend import keras, tf
 from enhsim_tf.common.training import dense_stack, fit_windows
-from enhsim_tf.datasets.labelled_windows import Share, write_windows_labelled
+from enhsim_tf.datasets.labelled_windows import write_windows_labelled
+from enhsim_tf.datasets.places import Share
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap

@@ -49,7 +49,7 @@ def table(path: str, samples: int) -> None:
 
 def command(*arguments: object) -> None:
     """Runs a command of the tool, without what it prints."""
-    from enhsim_tf.cli.main import main
+    from enhsim_tf.__main__ import main
 
     with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
         sys.exit(main([str(each) for each in arguments]))
@@ -58,7 +58,8 @@ def command(*arguments: object) -> None:
 def windows(folder: str, number: int, out: str) -> None:
     """Writes labelled windows of a saved simulator to Parquet, half of them of a degraded mode."""
     from enhsim_tf.coarse_simulator.degraded import Degraded
-    from enhsim_tf.datasets.labelled_windows import Share, write_windows_labelled
+    from enhsim_tf.datasets.labelled_windows import write_windows_labelled
+    from enhsim_tf.datasets.places import Share
     from enhsim_tf.simulator.simulator import EnhancedSimulator
 
     shares = [Share(None, number - number // 2, 0), Share(Degraded("stuck", 0.5), number // 2, 1)]

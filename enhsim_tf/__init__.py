@@ -17,7 +17,7 @@ _PLACES = {
     "FitOptions": "simulator.options",
     "FmuSimulator": "coarse_simulator.fmu",
     "FunctionSimulator": "coarse_simulator.interface",
-    "InjectOptions": "datasets.inject",
+    "InjectOptions": "datasets.inject_options",
     "InputError": "common.errors",
     "ParquetStore": "telemetry.parquet_store",
     "Recording": "coarse_simulator.recording",

@@ -1,7 +1,21 @@
 """`enhsim-tf`, or `python -m enhsim_tf`: telemetry of one's own, from a table to a simulator, training data and scores."""
 
-from enhsim_tf.cli.main import main
-from enhsim_tf.common.console import exit_process
+import importlib
+
+from enhsim_tf.cli.arguments import parse
+from enhsim_tf.cli.checks import check
+from enhsim_tf.common.console import exit_process, run_command
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command; None uses the arguments of the process. Invalid input gives one line on stderr and exit code 2."""
+
+    def run() -> int:
+        options = check(parse(arguments))
+        module = importlib.import_module(f"enhsim_tf.cli.{options.command}")  # only now, because its imports are slow
+        return getattr(module, f"run_{options.command}")(options)
+
+    return run_command(run, "interrupted; what was finished is kept")
 
 
 def command() -> None:

@@ -25,7 +25,6 @@ from enhsim_tf.common.errors import InputError  # noqa: E402
 ROOT = Path(__file__).parents[1]
 SLOW = "--slow"
 TOGETHER = ("paper", "simulator")  # folders whose files share fixtures that take seconds: a process runs all of a folder
-LEFT = pytest.StashKey[int]()
 
 
 def pytest_addoption(parser):
@@ -33,43 +32,14 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leaves the slow tests out, unless they are asked for."""
-    if config.getoption(SLOW):
-        return
-    left = {item for item in items if item.get_closest_marker("slow")}
-    if left:
-        config.hook.pytest_deselected(items=list(left))
+    """Leaves the slow tests out, unless they are asked for, and gives each file or folder to one process."""
+    if not config.getoption(SLOW):
+        left = [item for item in items if item.get_closest_marker("slow")]
+        config.hook.pytest_deselected(items=left)
         items[:] = [item for item in items if item not in left]
-    config.stash[LEFT] = len(left)
-    if hasattr(config, "workeroutput"):  # a process of xdist, which tells the first one
-        config.workeroutput["left"] = len(left)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """Gives the files of a folder whose fixtures take seconds to one process, and all other files one by one."""
-    if config.getvalue("dist") != "loadfile":
-        return None
-    from xdist.scheduler import LoadFileScheduling
-
-    class ByFolder(LoadFileScheduling):
-        def _split_scope(self, nodeid):
-            file = super()._split_scope(nodeid)
-            folder = file.split("/")[-2] if "/" in file else ""
-            return folder if folder in TOGETHER else file
-
-    return ByFolder(config, log)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node):
-    """Takes the number of tests that a process of xdist left out; all processes have the same."""
-    node.config.stash[LEFT] = getattr(node, "workeroutput", {}).get("left", 0)
-
-
-def pytest_terminal_summary(terminalreporter, config):
-    if left := config.stash.get(LEFT, 0):
-        terminalreporter.write_line(f"{left} slow tests were left out. To run them: python -m pytest {SLOW} -m slow")
+    for item in items:
+        folder = item.path.parent.name
+        item.add_marker(pytest.mark.xdist_group(folder if folder in TOGETHER else item.nodeid.partition("::")[0]))
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -213,8 +213,6 @@ def _add_events(parser: _Parser, noun: str, form: str, examples: str) -> None:
     _add_repeated(parser, "--at", f"an {noun} at a given sample or time, such as {examples}", f"{form}[:SEVERITY]@BEGIN/LENGTH", [])
     length = "length at random places: samples, a time such as 10min, or a range (default: 100)"
     parser.add_argument("--length", default="100", metavar="N[:N]", help=length)
-    gap = f"nominal samples around an {noun} at a random place (default: the longest length)"
-    parser.add_argument("--gap", type=int, metavar="N", help=gap)
     parser.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channels, is_anomaly")
 
 

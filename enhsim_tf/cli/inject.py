@@ -6,13 +6,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from enhsim_tf.cli.options import cleaned_channels, cleaning_options, counted, for_each, output_paths, refuse_same_file
+from enhsim_tf.cli.options import cleaned_channels, counted, for_each, output_paths, refuse_same_file
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.datasets.inject import InjectOptions, inject_channel, inject_joint, join_injected
+from enhsim_tf.common.errors import printable
+from enhsim_tf.datasets.inject import inject_channel, inject_joint, join_injected
 from enhsim_tf.datasets.label_columns import write_table
-from enhsim_tf.datasets.places import split_limits
-from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
 from enhsim_tf.telemetry.sources import read_source
@@ -20,14 +18,7 @@ from enhsim_tf.telemetry.sources import read_source
 
 def run_inject(options: argparse.Namespace) -> int:
     """Injects anomalies into each channel of the source, or into all of them together, and returns the exit code."""
-    kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
-    severity, length = (split_limits(name, getattr(options, name)) for name in ("severity", "length"))
-    try:
-        degrees = (float(severity[0]), float(severity[1]))
-    except ValueError:
-        raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
-    chosen = InjectOptions(kinds, degrees, length, options.number, tuple(options.at), options.gap, options.noise_sd, options.seed)
-    cleaning = cleaning_options(options, 3)
+    chosen, cleaning = options.chosen, options.cleaning
     series = read_source(options.source, options.column, options.time, cleaning)
     suffixes = (".csv",) if options.timeeval else (".parquet", ".csv")
     is_one_file = chosen.is_joint or (options.timeeval and options.out.suffix in suffixes and not os.path.isdir(options.out))

@@ -1,4 +1,4 @@
-"""Functions shared by several commands: cleaning options, output files, loading, and reporting of failed channels."""
+"""Functions shared by several commands: output files, loading, and reporting of failed channels."""
 
 import argparse
 import os
@@ -41,34 +41,9 @@ def tell_failed(failed: dict[str, str]) -> int:
     return 2 if failed else 0
 
 
-def refuse_without(options: argparse.Namespace, partner: str, *names: str) -> None:
-    """Refuses options that have a meaning only with another one, which is not given."""
-    for name in names:
-        if getattr(options, name) not in (None, [], False):
-            word = name.removesuffix("_s").replace("_", "-")
-            raise InputError(
-                f"Expected --{word} only together with --{partner}. Received: --{word} without it. Leave it out, or give --{partner}."
-            )
-
-
 def counted(number: int, noun: str) -> str:
     """Formats a number with its noun, for example `1 window` or `2,000 windows`."""
     return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
-
-
-def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:
-    """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
-    bad = "drop" if options.drop_bad else "refuse"
-    same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill".split()
-    return Cleaning(
-        **{name: getattr(options, name) for name in same if hasattr(options, name)},
-        interval_s=getattr(options, "interval", None),
-        labelled=labelled,
-        missing_values=tuple(value for values in options.missing_values for value in values.split(",")),
-        on_bad_times=bad,
-        on_bad_values=bad,
-        min_part=min_part,
-    )
 
 
 def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
@@ -90,9 +65,6 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     if out.suffix and not is_folder:
         raise InputError(f"Expected a file that ends in {' or '.join(suffixes)}, or a folder. Received: --out {out}.")
     paths = {name: folder_of(out, name).with_suffix(suffixes[0]) for name in names}
-    for path in paths.values():
-        if os.path.isdir(path):
-            raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Give another --out.")
     make_folder(out)
     return paths
 

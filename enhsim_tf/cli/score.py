@@ -9,7 +9,6 @@ import pandas as pd
 from enhsim_tf.cli.options import (
     channels_by_model,
     cleaned_channels,
-    cleaning_options,
     counted,
     for_each,
     output_paths,
@@ -18,9 +17,7 @@ from enhsim_tf.cli.options import (
 )
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import printable, spoken
-from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
 from enhsim_tf.simulator.model_folder import models_of
-from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.report import lines_of
@@ -29,11 +26,7 @@ from enhsim_tf.telemetry.sources import read_source
 
 def run_score(options: argparse.Namespace) -> int:
     """Scores the channels of the source with their simulators and returns the exit code."""
-    named = {option_name(name): name for name in (RESIDUAL, *all_detectors())}
-    detector = None if options.detector is None else named[options.detector]
-    chosen = ScoreOptions(detector, options.num_windows, options.false_alarm_rate, options.seed)
-    cleaning = cleaning_options(options, 2)
-    models = models_of(options.models)
+    models, cleaning = models_of(options.models), options.cleaning
     series = read_source(options.source, options.column, options.time, cleaning)
     channels = channels_by_model(series, models)
     source_names = {model: next(iter(names.values())) if len(names) == 1 else model for model, names in channels.items()}
@@ -45,7 +38,7 @@ def run_score(options: argparse.Namespace) -> int:
         telemetry, cleaned = cleaned_channels(series, channels[model], cleaning)
         simulator = EnhancedSimulator.load(models[model])
         run = run_for(simulator, options, cleaning)
-        frame = score(simulator, telemetry, run, chosen)
+        frame = score(simulator, telemetry, run, options.chosen)
         write_scores(paths[model], frame)
         if options.figure:
             from enhsim_tf.simulator.figures import score_figure  # matplotlib is slow to import

@@ -5,12 +5,11 @@ import json
 import os
 from pathlib import Path
 
-from enhsim_tf.cli.options import channels_by_model, cleaned_channels, cleaning_options, for_each, run_for
+from enhsim_tf.cli.options import channels_by_model, cleaned_channels, for_each, run_for
 from enhsim_tf.common.atomic_files import replace_folder, write_json
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.simulator.model_folder import folder_of, models_of, refuse_foreign
-from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.updating import update
 from enhsim_tf.telemetry.cleaning.report import lines_of
@@ -19,10 +18,8 @@ from enhsim_tf.telemetry.sources import read_source
 
 def run_update(options: argparse.Namespace) -> int:
     """Updates the simulators of the channels of the source and returns the exit code."""
-    FitOptions(held_out=options.held_out, seed=options.seed)  # checks both
-    models = models_of(options.models)
+    models, cleaning = models_of(options.models), options.cleaning
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
-    cleaning = cleaning_options(options, 2, "missing")
     series = read_source(options.source, options.column, options.time, cleaning)
     channels = channels_by_model(series, models)
     folders = {model: folder_of(out, model) for model in channels}

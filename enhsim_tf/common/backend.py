@@ -56,7 +56,6 @@ def _keep_freed_memory() -> None:
 def _start() -> None:
     os.environ |= {name: value for name, value in SETTINGS.items() if not os.environ.get(name)}
     _keep_freed_memory()
-    _check_backend("Expected KERAS_BACKEND", os.environ["KERAS_BACKEND"])
     with _standard_error_silenced():
         import tensorflow
 
@@ -64,20 +63,15 @@ def _start() -> None:
     tensorflow.get_logger().setLevel("ERROR")  # hides warnings about retraced graphs, which users cannot act on
 
 
-def _check_backend(expected: str, received: str) -> None:
-    if received != SETTINGS["KERAS_BACKEND"]:
-        raise InputError(
-            f"{expected} tensorflow. Received: {received}. The networks are trained with TensorFlow operations: "
-            "set the variable to tensorflow, or unset it."
-        )
-
-
+if (os.environ.get("KERAS_BACKEND") or "tensorflow") != "tensorflow":
+    raise InputError(
+        f"Expected KERAS_BACKEND tensorflow. Received: {os.environ['KERAS_BACKEND']}. The networks are trained with TensorFlow operations: "
+        "set the variable to tensorflow, or unset it."
+    )
 if "tensorflow" not in sys.modules:
     _start()
 
 import keras  # noqa: E402  after the settings
 import tensorflow as tf  # noqa: E402
-
-_check_backend("Expected Keras with the backend", keras.backend.backend())
 
 __all__ = ["keras", "tf"]

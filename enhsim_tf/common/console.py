@@ -46,26 +46,17 @@ class Progress:
     def loop(self, unit: str, total: int) -> Callable[[float], None]:
         """Starts to report a loop, by a line when `INTERVAL_S` seconds have passed since the last one.
 
-        The remaining time is extrapolated from all steps except the first, which also builds the network's graph.
-
         Returns:
             A function to be called with the number of finished units, such as epochs, which may be fractional.
         """
-        first: list[float] = []  # time at which the first step ended, and units finished by then
+        began = self.clock()
 
         def told(done: float) -> None:
-            if not 0 < done < total:
-                return
             now = self.clock()
-            if not first:
-                first.extend((now, done))
-            if now - self.last_line_s < INTERVAL_S:
-                return
-            self.last_line_s = now
-            line = f"{self.before}{unit} {math.ceil(done):,} of {total:,}, {math.floor(100 * done / total)} %"
-            if done > first[1]:
-                line += f", {_time_left((now - first[0]) / (done - first[1]) * (total - done))}"
-            self.tell(line)
+            if 0 < done < total and now - self.last_line_s >= INTERVAL_S:
+                self.last_line_s = now
+                left = _time_left((now - began) / done * (total - done))
+                self.tell(f"{self.before}{unit} {math.ceil(done):,} of {total:,}, {math.floor(100 * done / total)} %, {left}")
 
         return told
 

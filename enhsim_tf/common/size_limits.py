@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 MAX_COLUMNS = 10_000  # of a table or an array; each column becomes a channel
 _SMALL_TABLE_VALUES = 2_000_000  # a table with fewer values is accepted, however small its file is
@@ -70,6 +68,9 @@ def check_parquet(path: str | os.PathLike) -> None:
     Raises:
         ValueError: If the file is too large in memory or cannot be read. The message says why.
     """
+    import pyarrow as pa  # slow, and needed only here
+    import pyarrow.parquet as pq
+
     try:
         size = Path(path).stat().st_size
         with pq.ParquetFile(path) as file:

@@ -4,7 +4,6 @@ Most kinds of anomaly change one channel. Those of `JOINT_KINDS` need several: t
 how channels move together, and one is a fault that acts on all of them.
 """
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,75 +11,13 @@ import pandas as pd
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.datasets.inject_options import InjectOptions, checked_place
 from enhsim_tf.datasets.label_columns import series_table
-from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_length, parse_place
-from enhsim_tf.detection.anomalies import INJECTIONS, Anomaly, check_kind, draw_begin, estimate_noise_sd, inject_anomalies
+from enhsim_tf.datasets.places import draw_between, length_limits
+from enhsim_tf.detection.anomalies import Anomaly, draw_begin, estimate_noise_sd, inject_anomalies
 from enhsim_tf.simulator.joint import telemetry_of
 from enhsim_tf.telemetry.pandas_series import index_of
 from enhsim_tf.telemetry.series import Telemetry
-
-JOINT_KINDS = ("another_time", "delay", "lost_coupling", "common_shift")
-_MOST = 10_000  # anomalies in a channel
-
-
-@dataclasses.dataclass(frozen=True)
-class InjectOptions:
-    """Settings of `inject_channel` and `inject_joint`.
-
-    Args:
-        kinds: Kinds of the anomalies whose places are drawn, of `anomalies.INJECTIONS` or of `JOINT_KINDS`. They are used in turn.
-        severity: Least and greatest severity, in units of the standard deviation of the noise. Each anomaly draws its own.
-        length: Least and greatest length: samples, or a time such as `10min`. Each anomaly draws its own.
-        number: Number of anomalies whose places are drawn. None: one of each kind.
-        at: Anomalies at given places, `KIND[:SEVERITY]@BEGIN/LENGTH`. BEGIN is a sample number or a time. The severity is drawn if it
-            is not given.
-        gap: Least number of samples between a drawn anomaly and any other. None: the length of the longest drawn anomaly.
-        noise_sd: Standard deviation of the noise, in the unit of the channel. None: `anomalies.estimate_noise_sd`.
-        seed: Random seed. Each channel draws from its own generator, which depends on the seed and the name of the channel.
-
-    Raises:
-        InputError: If a kind is unknown, a number is out of range, or options contradict each other.
-    """
-
-    kinds: Sequence[str] = ()
-    severity: tuple[float, float] = (4.0, 4.0)
-    length: tuple[str, str] = ("100", "100")
-    number: int | None = None
-    at: Sequence[str] = ()
-    gap: int | None = None
-    noise_sd: float | None = None
-    seed: int = 0
-
-    @property
-    def is_joint(self) -> bool:
-        """Whether the anomalies are those of several channels."""
-        return bool(set(self.kinds) & set(JOINT_KINDS))
-
-    def __post_init__(self):
-        low, high = self.severity
-        if self.is_joint and set(self.kinds) - set(JOINT_KINDS):
-            kinds = ", ".join(self.kinds)
-            raise InputError(f"Expected kinds among {', '.join(JOINT_KINDS)}. Received: {kinds}. Inject other kinds on their own.")
-        if self.is_joint and (self.at or self.noise_sd is not None):
-            raise InputError(
-                f"Expected drawn places and the estimated noise with {self.kinds[0]}. Received: --at or --noise-sd. Leave it out."
-            )
-        for kind in () if self.is_joint else self.kinds:
-            check_kind(kind, low)
-        if not (0 <= low <= high and (high < np.inf or low == high)):
-            raise InputError(f"Expected severities from 0 on, the least first. Received: {low:g}:{high:g}.")
-        if not self.kinds and not self.at:
-            raise InputError(f"Expected kinds of anomaly or places. Received: neither. Give --kinds, of {', '.join(INJECTIONS)}, or --at.")
-        if self.number is not None and (not 1 <= self.number <= _MOST or not self.kinds):
-            raise InputError(f"Expected 1 to {_MOST:,} anomalies with drawn places, of given kinds. Received: number={self.number}.")
-        if self.gap is not None and self.gap < 0:
-            raise InputError(f"Expected a gap of 0 or more samples. Received: gap={self.gap}.")
-        if self.noise_sd is not None and not 0 < self.noise_sd < np.inf:
-            raise InputError(f"Expected a standard deviation of the noise above 0. Received: noise_sd={self.noise_sd}.")
-        for text in self.length:
-            parse_length(str(text))
-        for text in self.at:
-            _checked_place(text)
 
 
 def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.DataFrame:
@@ -114,21 +51,15 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.Dat
         for each in range(number)
     ]
     given = []
-    for place in map(_checked_place, options.at):
+    for place in map(checked_place, options.at):
         severity = draw_between(options.severity, rng) if place.severity is None else place.severity
         given.append(Anomaly(place.kind, severity, *place.samples(index, interval_s)))
-    gap = max([length for *_, length in drawn], default=0) if options.gap is None else options.gap
+    gap = max([length for *_, length in drawn], default=0)
     changed, mask, anomalies = inject_anomalies(values, given, drawn, noise_sd, gap, rng)
     events = [(each.kind, each.severity, each.begin, each.end) for each in anomalies]
     frame = series_table(changed[:, None], mask[:, None], [parts[0].name], events, index)
     frame.attrs.update(noise_sd=noise_sd, anomalies=anomalies)
     return frame
-
-
-def _checked_place(text: str) -> Place:
-    place = parse_place(text)
-    check_kind(place.kind, 1.0 if place.severity is None else place.severity)
-    return place
 
 
 def join_injected(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -167,7 +98,7 @@ def inject_joint(telemetry: Recording, options: InjectOptions) -> pd.DataFrame:
     found: list[tuple[str, float, int, int, str]] = []
     for kind, length in sorted(drawn, key=lambda each: -each[1]):
         taken = [(begin, end) for _, _, begin, end, _ in found]
-        begin = draw_begin(bounds, taken, length, longest if options.gap is None else options.gap, rng)
+        begin = draw_begin(bounds, taken, length, longest, rng)
         is_common, here = kind == "common_shift", slice(begin, begin + length)
         degree = draw_between(options.severity, rng) if is_common else 1.0
         channel = int(rng.integers(values.shape[1]))

@@ -91,9 +91,6 @@ def coverage_lines(model: EnhancedSimulator, run: Recording) -> list[str]:
             lines[0] += f" ({', '.join(f'{kind} {np.mean(covered[names == kind]):.1%}' for kind in kinds)})"
     if np.mean(covered) < 0.5:
         lines[0] += "; outside it, the enhanced run is an extrapolation, see the column out_of_range"
-    constant = [name for number, name in enumerate(usable.columns) if all(np.ptp(part.values[:, number]) == 0 for part in usable.parts)]
-    if constant:
-        lines.append(f"coarse columns that are constant in this run, though they varied in the fit: {', '.join(constant)}")
     left = len(run) - len(usable)
     if left:
         lines.append(f"left out, in parts shorter than a window of {model.window} samples: {left:,} of {len(run):,} samples")

@@ -1,6 +1,5 @@
 """Labelled training data: windows, or one continuous series, with labels that mark exactly the samples that a scenario has changed."""
 
-import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,33 +12,10 @@ from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_s
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import parquet_options, series_table, window_schema, window_table
-from enhsim_tf.datasets.places import parse_start
+from enhsim_tf.datasets.places import Share, parse_start
 from enhsim_tf.detection.anomalies import TRIES, draw_begin
 from enhsim_tf.simulator.changes import fade_length
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-
-
-@dataclasses.dataclass(frozen=True)
-class Share:
-    """A part of a training set: windows of one scenario, or nominal ones, with a random seed of their own."""
-
-    scenario: Degraded | None
-    num_windows: int
-    seed: int
-
-
-def divide_windows(scenarios: Sequence[Degraded], nominal_share: float, num_windows: int, seed: int) -> list[Share]:
-    """Divides windows between nominal telemetry and scenarios. Scenarios get equal numbers; the first ones get the remainder."""
-    num_nominal = round(nominal_share * num_windows) if scenarios else num_windows
-    each, left = divmod(num_windows - num_nominal, len(scenarios) or 1)
-    counts = [num_nominal, *(each + (number < left) for number in range(len(scenarios)))]
-    if scenarios and nominal_share < 1 and counts[-1] == 0:
-        raise InputError(
-            f"Expected at least one window for each of {len(scenarios)} scenarios. Received: {num_windows} windows, of which a share of "
-            f"{nominal_share:g} is nominal. Ask for more windows."
-        )
-    seeds = np.random.SeedSequence(seed).generate_state(len(counts)).tolist()
-    return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
 def write_windows_labelled(path: str | os.PathLike, simulator: EnhancedSimulator, shares: Sequence[Share]) -> dict[Degraded, int]:
@@ -56,7 +32,7 @@ def write_windows_labelled(path: str | os.PathLike, simulator: EnhancedSimulator
     make_folder(Path(path).parent)
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **parquet_options(schema)) as writer:
         for share in shares:
-            scenario = _active(share.scenario, simulator.window)
+            scenario = share.scenario
             name, severity = (scenario.mode, scenario.severity) if scenario else ("", 0.0)
             for windows, masks in simulator.generate_labelled_chunks(share.num_windows, scenario, share.seed):
                 writer.write_table(window_table(windows, masks, channels, [name] * len(windows), [severity] * len(windows)))
@@ -102,7 +78,6 @@ def series_labelled(
             are given.
     """
     index = series_index(num_samples, simulator.interval_s, start)
-    scenario = _active(scenario, num_samples)
     values, masks, events = simulator.generate_labelled_series(num_samples, scenario, seed, schedule=schedule)
     return series_table(values, masks, simulator.channels, events, index)
 
@@ -114,12 +89,11 @@ def draw_schedule(
     modes: Sequence[Degraded],
     number: int,
     lengths: tuple[int, int],
-    gap: int | None,
     rng: np.random.Generator,
 ) -> list[ScheduledMode]:
     """Adds events at drawn places to those at given places, in the order of time.
 
-    The modes are used in turn. The longest events are placed first, each uniformly among all places that are free. A place where
+    The modes are used in turn. The longest events are placed first, each uniformly among all places that are free, at the distance of the greatest length. A place where
     the mode would not change the coarse run is drawn again: for example, `stuck` changes nothing while the mechanism stands still.
 
     Args:
@@ -129,13 +103,12 @@ def draw_schedule(
         modes: Modes and severities of the drawn events; their onset is not used.
         number: Number of events at drawn places.
         lengths: Least and greatest length of a drawn event in samples.
-        gap: Least number of nominal samples around a drawn event, at least twice the fade of a change. None: the greatest length.
         rng: Random number generator.
     """
     if simulator.is_run_model:
         simulator.alignment.draw(np.zeros(0, int), [*modes, *given], rng)  # refuses them
     schedule = check_schedule(given, num_samples)
-    gap = max(2 * fade_length(simulator.window) + 1, lengths[1] if gap is None else gap)
+    gap = max(2 * fade_length(simulator.window) + 1, lengths[1])  # changes that fade do not meet
     drawn = [(modes[each % len(modes)], int(rng.integers(lengths[0], lengths[1] + 1))) for each in range(number)]
     for mode, length in sorted(drawn, key=lambda each: -each[1]):
         taken = [(event.begin, event.end) for event in schedule]
@@ -153,12 +126,3 @@ def draw_schedule(
             )
         schedule.append(event)
     return sorted(schedule, key=lambda event: event.begin)
-
-
-def _active(scenario: Degraded | None, num_samples: int) -> Degraded | None:
-    """Returns the scenario, or None if it changes nothing because its severity is 0."""
-    if scenario is None or scenario.severity == 0:
-        return None
-    if scenario.first_sample(num_samples) >= num_samples:
-        raise InputError(f"Expected an onset within {num_samples} samples. Received: {scenario.onset}. Choose an earlier one.")
-    return scenario

@@ -1,6 +1,5 @@
 """The mix of a large data set, from the options or from a scenario file (docs/large_data_sets.md): scenarios, models and their shares."""
 
-import collections
 import dataclasses
 import math
 import os
@@ -128,19 +127,12 @@ def _shown(received: Any) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """The safe loader, without aliases, which multiply what is written, and repeated keys. A key without a value is left out."""
+    """The safe loader without aliases, which multiply what is written."""
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
         if self.check_event(yaml.AliasEvent):
             raise yaml.MarkedYAMLError(problem="an alias", problem_mark=self.peek_event().start_mark)
         return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-        counts = collections.Counter(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
-        twice = [key for key, count in counts.items() if count > 1]
-        if twice:
-            raise yaml.MarkedYAMLError(problem=f"the key {twice[0][:40]!r} stands there twice", problem_mark=node.start_mark)
-        return {key: value for key, value in super().construct_mapping(node, deep).items() if value is not None}
 
 
 def _load(path: Path) -> Any:
@@ -155,11 +147,6 @@ def _load(path: Path) -> Any:
         raise InputError(f"Expected a scenario file of at most {_MAX_BYTES:,} bytes. Received: a longer one, {path.name!r}.")
     try:
         return yaml.load(raw.decode("utf-8-sig"), _Loader)
-    except yaml.MarkedYAMLError as error:
-        where = "" if error.problem_mark is None else f" in line {error.problem_mark.line + 1}"
-        reason = f"{' '.join(str(error.problem or error.context).split())[:120]}{where}"
-    except RecursionError:
-        reason = "too deeply nested entries"
-    except (yaml.YAMLError, ValueError, OverflowError) as error:  # an invalid date or number, or bytes that are not UTF-8
-        reason = " ".join(str(error).split())[:120]
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:  # also a date or a number that is none, and deep nesting
+        reason = " ".join(str(error).split())[:200]
     raise InputError(f"Expected plain YAML, as in docs/large_data_sets.md. Received: {path.name!r}, {reason}.")

@@ -1,14 +1,17 @@
-"""Parses scenarios, lengths, times and places of events, as they are written on the command line."""
+"""Scenarios, lengths, times and places of events as they are written on the command line, and shares of windows. Nothing slow is imported."""
 
 import dataclasses
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _PLACE = re.compile(r"(?P<kind>\w+)(?::(?P<severity>[^@]+))?@(?P<begin>.+)/(?P<length>[^/]+)")
 _SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
@@ -22,13 +25,14 @@ def parse_scenario(text: str) -> Degraded:
     """Parses `mode:severity` or `mode:severity:onset`, such as `stuck:0.5`, with `CHANNEL=` before it for one of several channels."""
     channel, is_named, rest = text.rpartition("=")
     mode, *numbers = rest.split(":")
-    if mode not in MODES or not 1 <= len(numbers) <= 2:
-        raise InputError(f"Expected mode:severity or mode:severity:onset, mode one of {', '.join(MODES)}. Received: {text!r}.")
     try:
-        values = [float(number) for number in numbers]
+        severity, onset = map(float, numbers if len(numbers) == 2 else [*numbers, Degraded.onset])
+        return Degraded(mode, severity, onset, channel if is_named else None)
     except ValueError:
-        raise InputError(f"Expected numbers from 0 to 1 after the mode. Received: {text!r}. Write for example {mode}:0.5.") from None
-    return Degraded(mode, *values, channel=channel if is_named else None)
+        raise InputError(
+            f"Expected mode:severity or mode:severity:onset with numbers from 0 to 1, such as stuck:0.5, mode one of: {', '.join(MODES)}. "
+            f"Received: {text!r}."
+        ) from None
 
 
 def parse_length(text: str) -> tuple[float, str]:
@@ -56,8 +60,10 @@ def parse_num_samples(text: str, interval_s: float) -> int:
     return max(1, round(samples))
 
 
-def parse_start(start: str | pd.Timestamp) -> pd.Timestamp:
+def parse_start(start: "str | pd.Timestamp") -> "pd.Timestamp":
     """Converts a time such as `2024-01-01`, from 1700 to 2200, to UTC. A time without a time zone is taken as UTC."""
+    import pandas as pd
+
     try:
         time = pd.to_datetime(start, utc=True, format="ISO8601").as_unit("ns")
     except (ValueError, TypeError, OverflowError, AttributeError):
@@ -76,7 +82,7 @@ class Place:
     begin: str  # a sample number, or a time
     length: str
 
-    def samples(self, index: pd.Index, interval_s: float) -> tuple[int, int]:
+    def samples(self, index: "pd.Index", interval_s: float) -> tuple[int, int]:
         """Returns the first sample and the number of samples; the index of the series has times in UTC, or is that of one without times."""
         length = parse_num_samples(self.length, interval_s)
         if self.begin.isdecimal():
@@ -128,3 +134,28 @@ def draw_between(limits: tuple[float, float], rng: np.random.Generator) -> float
     """Draws a number uniformly between two limits; if they are equal, it is that number and nothing is drawn."""
     low, high = limits
     return low if low == high else float(rng.uniform(low, high))
+
+
+@dataclasses.dataclass(frozen=True)
+class Share:
+    """A part of a training set: windows of one scenario, or nominal ones, with a random seed of their own."""
+
+    scenario: Degraded | None
+    num_windows: int
+    seed: int
+
+
+def divide_windows(scenarios: Sequence[Degraded], nominal_share: float, num_windows: int, seed: int) -> list[Share]:
+    """Divides windows between nominal telemetry and scenarios. Scenarios get equal numbers; the first ones get the remainder."""
+    if num_windows < 1:
+        raise InputError(f"Expected at least one window. Received: --windows {num_windows}.")
+    num_nominal = round(nominal_share * num_windows) if scenarios else num_windows
+    each, left = divmod(num_windows - num_nominal, len(scenarios) or 1)
+    counts = [num_nominal, *(each + (number < left) for number in range(len(scenarios)))]
+    if scenarios and nominal_share < 1 and counts[-1] == 0:
+        raise InputError(
+            f"Expected at least one window for each of {len(scenarios)} scenarios. Received: {num_windows} windows, of which a share of "
+            f"{nominal_share:g} is nominal. Ask for more windows."
+        )
+    seeds = np.random.SeedSequence(seed).generate_state(len(counts)).tolist()
+    return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]

@@ -1,6 +1,6 @@
 """The plan of a large data set: its scenarios, the checksums of its models, its seed, and its division into shards.
 
-A plan is made without loading a network. Two plans with the same `plan_key` describe the same shards.
+Two plans with the same `plan_key` describe the same shards.
 """
 
 import dataclasses
@@ -8,7 +8,6 @@ import hashlib
 import importlib.metadata
 import json
 import os
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,13 +15,13 @@ from typing import Any
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.mix import MOST_WINDOWS, Mix
-from enhsim_tf.simulator.model_folder import MANIFEST, channels_of, check_saved, settings_of
+from enhsim_tf.simulator.model_folder import MANIFEST
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 FORMAT = "enhsim_tf.datasets.generate/3"
 _SHARD = 8_192  # default windows per shard, for windows of up to 512 samples
 _SHARD_VALUES = 2**22  # default values per shard, for longer windows
 MOST_VALUES = 2**26  # maximum values per shard: 256 MiB, which a worker holds in memory
-_MOST_SHARDS = 2_000_000
 _VERSIONS = ("numpy", "pyarrow")
 
 
@@ -69,8 +68,6 @@ class Plan:
             raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: {self.num_windows:,}.")
         if self.shard > most:
             raise InputError(f"Expected shards of at most {most:,} such windows. Received: shard: {self.shard:,}.")
-        if self.num_shards > _MOST_SHARDS:
-            raise InputError(f"Expected at most {_MOST_SHARDS:,} shards. Received: {self.num_shards:,}. Make them larger with `shard:`.")
 
     @property
     def window(self) -> int:
@@ -125,17 +122,11 @@ def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int, 
 
 
 def _model_of(name: str, folder: Path, share: float, mix: Mix) -> Model:
-    """Reads checksum, window length and interval of a saved simulator without loading its networks."""
-    check_saved(folder)
-    settings = settings_of(folder)
-    interval_s, window, alignment = (settings.get(each) for each in ("interval_s", "window", "alignment"))
-    if type(interval_s) not in (int, float) or not 0 < interval_s <= sys.float_info.max:
-        raise InputError(f"Expected interval_s to be a number above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
-    if type(window) is not int or not 2 <= window <= MOST_VALUES:
-        raise InputError(f"Expected window to be a number of samples in settings.json. Received: {str(window)[:40]} in {folder}.")
-    if mix.scenarios and isinstance(alignment, dict) and alignment.get("kind") == "runs":
+    """Reads window length, interval and channels of a saved simulator, and the checksum of its manifest."""
+    simulator = EnhancedSimulator.load(folder)
+    if mix.scenarios and simulator.is_run_model:
         raise InputError(
             f"Expected no scenario of a model of recorded runs. Received: {mix.scenarios[0].mode} for {folder}. "
             "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
         )
-    return Model(name, folder, share, sha256(folder / MANIFEST), window, float(interval_s), channels_of(folder))
+    return Model(name, folder, share, sha256(folder / MANIFEST), simulator.window, simulator.interval_s, simulator.channels)

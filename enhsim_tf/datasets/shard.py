@@ -149,13 +149,7 @@ class ShardMaker:
         if len(self.plan.models) > 1:
             names = np.array([model.name for model in self.plan.models], object)
             table = table.append_column("model", pa.array(names[rows.model], pa.string()))
-        try:
-            with replace_file(path) as temporary:
-                options = parquet_options(table.schema)
-                pq.write_table(table.cast(shard_schema(self.settings)), temporary, row_group_size=_ROW_GROUP, **options)
-                return Record(shard, table.num_rows, sha256(temporary))
-        except (OSError, pa.ArrowException) as error:
-            reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:120]
-            raise InputError(
-                f"Expected {path.name} to be written. Received: {reason}. Finished shards are kept: fix the cause and run the same command again."
-            ) from None
+        with replace_file(path) as temporary:
+            options = parquet_options(table.schema)
+            pq.write_table(table.cast(shard_schema(self.settings)), temporary, row_group_size=_ROW_GROUP, **options)
+            return Record(shard, table.num_rows, sha256(temporary))

@@ -15,11 +15,9 @@ import pytest
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
-from enhsim_tf.cli.arguments import DETECTORS, parse
-from enhsim_tf.cli.options import cleaning_options
-from enhsim_tf.coarse_simulator.degraded import MODES
+from enhsim_tf.cli.arguments import parse
+from enhsim_tf.cli.checks import cleaning_options
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.detection import registry
 from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.simulator import fit_many
 from enhsim_tf.simulator.model_folder import channels_of, models_of
@@ -33,12 +31,12 @@ COMMAND = [sys.executable, "-m", "enhsim_tf"]
 TINY = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "gaussian"]
 
 
-def table(num_samples=1_500, interval="10s"):
+def table(num_samples=1_500):
     """Clean telemetry of two channels."""
     rng, places = np.random.default_rng(0), np.arange(num_samples)
     volts = 20 + 3 * np.sin(2 * np.pi * places / 40) + 0.2 * rng.standard_normal(num_samples)
     amps = np.round(2 + np.sin(2 * np.pi * places / 50), 1)
-    return pd.DataFrame({"utc": pd.date_range("2024-01-01", periods=num_samples, freq=interval), "volts": volts, "amps": amps})
+    return pd.DataFrame({"utc": pd.date_range("2024-01-01", periods=num_samples, freq="10s"), "volts": volts, "amps": amps})
 
 
 def dirty():
@@ -63,16 +61,12 @@ def world(tmp_path_factory):
     table().to_csv(folder / "two.csv", index=False)
     table()[["utc", "volts"]].to_csv(folder / "one.csv", index=False)
     dirty().to_csv(folder / "dirty.csv", index=False)
-    table(interval="7s")[["utc", "volts"]].to_csv(folder / "faster.csv", index=False)
-    pd.DataFrame({"note": ["a", "b"]}).to_csv(folder / "words.csv", index=False)
-    table(50)[["utc", "volts"]].to_csv(folder / "short.csv", index=False)
     pd.DataFrame({"volts": np.ones(1_500), "amps": np.arange(1_500) % 2 * 0.0}).to_csv(folder / "still.csv", index=False)
     (folder / "mix.yaml").write_text("windows: 10\nseed: 1\nmodels: [{folder: volts}]\n")
     for name in ("volts", "amps"):
         small(name).save(folder / "models" / name)
     small("volts").save(folder / "single" / "volts")
     small("volts", "amps").save(folder / "joint" / "volts~amps")
-    (folder / "empty").mkdir()
     (folder / "foreign" / "volts").mkdir(parents=True)
     (folder / "foreign" / "volts" / "notes.txt").write_text("mine")
     return folder
@@ -145,12 +139,24 @@ def shell(*arguments, cwd, **options):
 # help
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["score", "--help"], ["scrore"], []])
-def test_help_and_wrong_options_import_nothing_slow(arguments):
+@pytest.mark.parametrize(
+    "words",
+    [
+        "--help",
+        "score --help",
+        "scrore",
+        "fit x.csv --out m --delay 3",
+        "score m x.csv --out y.csv --false-alarm-rate 0",
+        "generate m --out x --windows 5 --scenario stuck:half",
+        "inject x.csv --out y.csv --kinds rust",
+    ],
+)
+def test_help_and_wrong_options_import_nothing_slow(words):
+    arguments = words.split()
     script = (
         "import sys\nfrom enhsim_tf.__main__ import main\ncode = 0\n"
         f"try:\n    code = main({arguments})\nexcept SystemExit as end:\n    code = end.code\n"
-        "print('loaded:', [name for name in ('pandas', 'tensorflow', 'keras', 'numpy', 'sklearn', 'matplotlib') if name in sys.modules])\n"
+        "print('loaded:', [name for name in ('pandas', 'tensorflow', 'keras', 'pyarrow', 'sklearn', 'scipy', 'matplotlib') if name in sys.modules])\n"
         "sys.exit(code)"
     )
     ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
@@ -160,20 +166,6 @@ def test_help_and_wrong_options_import_nothing_slow(arguments):
         assert "usage: enhsim-tf" in ended.stdout and "exit code" in ended.stdout and not ended.stderr
     else:
         assert len(ended.stderr.splitlines()) == 1 and ended.stderr.startswith("error: Expected ")
-
-
-def test_help_lists_all_choices(capsys):
-    for command, words in (
-        ("generate", [*MODES, "stuck:0.5"]),
-        ("score", DETECTORS),
-        ("fit", ["influxdb://", "autoregression"]),
-        ("inject", INJECTIONS),
-    ):
-        with pytest.raises(SystemExit):
-            parse([command, "--help"])
-        text = capsys.readouterr().out
-        assert all(word in text for word in words) and max(map(len, text.splitlines())) <= 140
-    assert list(map(registry.option_name, (registry.RESIDUAL, *registry.all_detectors()))) == list(DETECTORS)
 
 
 # end to end
@@ -452,56 +444,30 @@ SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
 OF_RUNS = "generate MODEL_DIR --coarse"
 WRONG = {
     "no command": ([], "{fit,generate,verify,score,update,inject}"),
-    "fit without a source": (["fit", "--out", "models"], "SOURCE"),
-    "source that is not there": (["fit", "nothing.csv", "--out", "models"], "nothing.csv"),
-    "source of unknown kind": (["fit", "WORLD/models/volts/settings.json", "--out", "models"], "settings.json"),
-    "time column that is not there": ([*FIT, "--time", "when"], "'when'"),
     "seed too large": ([*GENERATE, "--windows", "5", "--seed", str(2**31)], str(2**31)),
-    "no workers": ([*FIT, "--workers", "0"], "worker"),
     "fit into a file": (["fit", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv"),
     "fit into a foreign folder": (["fit", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
     "no windows of a large data set": ([*GENERATE, "--workers", "1"], "--windows"),
-    "a large series": ([*GENERATE, "--workers", "1", "--continuous", "1d"], "--continuous"),
-    "too large a data set": ([*GENERATE, "--workers", "1", "--windows", "20_000_000_000"], "windows"),
     "scenarios in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--scenario", "stuck:0.5"], "--scenario"),
-    "windows in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--windows", "9"], "10 in the scenario file"),
-    "seeds in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--seed", "0"], "seed"),
     "models in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--channel", "volts"], "--channel"),
     "neither windows nor a length": (GENERATE, "--windows"),
     "no windows": ([*GENERATE, "--windows", "0"], "--windows 0"),
     "share out of range": ([*GENERATE, "--windows", "5", "--scenario", "stuck:0.5", "--nominal-share", "2"], "2.0"),
-    "share without scenarios": ([*GENERATE, "--windows", "5", "--nominal-share", "0.5"], "--nominal-share"),
     "scenario of another channel": ([*GENERATE, "--windows", "5", "--scenario", "watts=drift:0.5"], "'watts'"),
-    "two scenarios in a series": (
-        [*GENERATE, "--continuous", "1d", "--scenario", "stuck:0.5", "--scenario", "drift:0.5"],
-        "--number",
-    ),
-    "events of windows": ([*GENERATE, "--windows", "5", "--scenario", "stuck:1", "--number", "3"], "--continuous"),
-    "events of no mode": ([*GENERATE, "--continuous", "1d", "--number", "3"], "--number 3"),
-    "a place and a scenario": ([*GENERATE, "--continuous", "900", "--at", "stuck:1@90/20", "--scenario", "drift:1"], "--number"),
-    "windows for TimeEval": ([*GENERATE, "--windows", "5", "--timeeval"], "--continuous"),
     "start without a series": ([*GENERATE, "--windows", "5", "--start", "2024-01-01"], "--start"),
     "models that are not there": (["generate", "nowhere", "--windows", "5", "--out", "x.parquet"], "nowhere"),
     "channel that was not fitted": ([*GENERATE, "--windows", "5", "--channel", "amps"], "'amps'"),
     "one file for two channels": (["generate", "WORLD/models", "--windows", "5", "--out", "x.parquet"], "2 files"),
     "output of a name no file can have": (["generate", "WORLD/single", "--windows", "5", "--out", "x" * 300 + ".parquet"], "long"),
-    "unknown detector": ([*SCORE, "--detector", "oracle"], "'oracle'"),
     "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "false_alarm_rate"),
-    "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
-    "score a channel of two": (["score", "WORLD/joint", "WORLD/one.csv", "--out", "x.parquet"], "volts, amps"),
-    "update into a foreign folder": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
     "update where a simulator is": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/models"], "--replace"),
-    "a delay without a run": ([*FIT, "--delay", "3"], "--delay only together with --coarse"),
-    "a column of no run": ([*FIT, "--coarse-column", "volts"], "--coarse-column only"),
-    "copies without a run": ([*GENERATE, "--copies", "3", "--windows", "2"], "--copies only"),
-    "windows of a run": ([*COPIES, "--windows", "2"], "--windows without --coarse"),
-    "scenarios of a run": ([*COPIES, "--scenario", "stuck:0.5"], "--scenario without --coarse"),
+    "a delay without a run": ([*FIT, "--delay", "3"], "--delay without --coarse"),
+    "windows of a run": ([*COPIES, "--windows", "2"], "--windows with --coarse"),
     "a scenario of a model of runs": (
         ["generate", "RUNS/models", "--windows", "4", "--scenario", "stuck:0.5", "--out", "x.parquet"],
         OF_RUNS,
     ),
-    "one in a series of it": (["generate", "RUNS/models", "--continuous", "1h", "--scenario", "stuck:0.5", "--out", "x.parquet"], OF_RUNS),
     "an event in a series of it": (["generate", "RUNS/models", "--continuous", "1h", "--at", "stuck@10/20", "--out", "x.parquet"], OF_RUNS),
     "one in a large data set of it": (
         ["generate", "RUNS/models", "--windows", "4", "--scenario", "stuck:0.5", "--workers", "1", "--out", "x"],
@@ -509,9 +475,7 @@ WRONG = {
     ),
     "a run shorter than a window": (["generate", "RUNS/models", "--coarse", "RUNS/short.csv", "--out", "x.parquet"], "32 samples"),
     "scores without a run": (["score", "RUNS/models", "RUNS/new.csv", "--out", "x.parquet"], "Expected --coarse"),
-    "an update without a run": (["update", "RUNS/models", "RUNS/new.csv", "--out", "x"], "Expected --coarse"),
     "a run of another time": (["score", "RUNS/models", "RUNS/new.csv", "--coarse", "RUNS/later.csv", "--out", "x.parquet"], "in time"),
-    "inject nothing": (INJECT, "--kinds"),
     "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
     "inject into the telemetry itself": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "WORLD/one.csv"], "for both"),
     "inject TimeEval's table as Parquet": ([*INJECT[:-1], "x.parquet", "--kinds", "ramp", "--timeeval"], "x.parquet"),
@@ -537,12 +501,6 @@ def test_scores_of_a_folder_do_not_overwrite_the_telemetry(told, world, tmp_path
     before = (tmp_path / "volts.parquet").read_bytes()
     code, _, errors = told("score", "WORLD/single", "volts.parquet", "--windows", 30, "--out", ".")
     assert code == 2 and "for both" in errors[0] and (tmp_path / "volts.parquet").read_bytes() == before
-
-
-def test_an_output_that_is_a_folder_is_refused(told, tmp_path):
-    (tmp_path / "sets" / "volts.parquet").mkdir(parents=True)
-    code, _, errors = told("generate", "WORLD/single", "--windows", 5, "--out", "sets")
-    assert code == 2 and "a folder of that name" in errors[0]
 
 
 def test_a_closed_pipe_ends_the_command_without_a_message(world, tmp_path):

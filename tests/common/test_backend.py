@@ -34,12 +34,8 @@ def test_the_users_choice_of_kernels_wins(value, is_on):
 REFUSED = "from enhsim_tf.common.errors import InputError\ntry:\n    import enhsim_tf.common.backend\nexcept InputError as error:\n    print(error)"
 
 
-def test_another_backend_of_keras_is_refused(tmp_path):
-    """Other backends need packages that are not installed, so a stub of Keras that was imported before reports another one."""
+def test_another_backend_of_keras_is_refused():
     assert run(REFUSED, KERAS_BACKEND="jax").stdout.startswith("Expected KERAS_BACKEND tensorflow. Received: jax.")
-    (tmp_path / "keras.py").write_text("class backend:\n    def backend():\n        return 'torch'\n")
-    ended = run("import keras\n" + REFUSED, PYTHONPATH=str(tmp_path))
-    assert ended.stdout.startswith("Expected Keras with the backend tensorflow. Received: torch."), ended.stderr
 
 
 @pytest.mark.slow

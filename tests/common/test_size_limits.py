@@ -1,6 +1,5 @@
 """Files whose headers declare more than they contain are rejected before memory is allocated; intact files are read unchanged."""
 
-import io
 import json
 import os
 import resource
@@ -40,7 +39,6 @@ def test_an_array_is_read_as_it_was_written(tmp_path, array):
     ("descr", "shape", "word"),
     [
         ("<f8", (10**12,), "greater than file"),
-        ("<f8", (61,), "greater than file"),
         ("<f8", (10**30,), "too large"),
         ("<f8", (-1,), "negative"),
         ("|S0", (10**12,), "no numbers"),
@@ -108,20 +106,13 @@ def test_a_pipe_is_refused_without_blocking(tmp_path):
         read_json(tmp_path / "x.json", 100)
 
 
-def parquet_bomb(path, *content):
-    sink = io.BytesIO()
-    pq.write_table(repeated(*content), sink, compression="zstd", store_schema=False)
-    path.write_bytes(sink.getvalue())
-
-
 YAML = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{b}: &{b} [{', '.join(9 * [f'*{a}'])}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
 )
 MANIFEST = '{"format": "enhsim_tf.datasets.generate/2", "settings": {"windows": 1000000000, "shard": 1, "window": 1, "interval_s": 1.0, "models": []}'
 BOMBS = {
     "npy": lambda path: npy(path, "<f8", (10**12,), bytes(80)),
-    "rows.parquet": lambda path: parquet_bomb(path, 15_000_000),
-    "text.parquet": lambda path: parquet_bomb(path, 1_000_000, "long " * 20_000),  # 100 GB of text
+    "parquet": lambda path: pq.write_table(repeated(1_000_000, "long " * 20_000), path, compression="zstd", store_schema=False),  # 100 GB
     "yaml": lambda path: path.write_text(YAML),
     "_manifest.json": lambda path: path.write_text(MANIFEST + ', "shards": [' + "{}," * 300_000 + "{}]}"),
 }

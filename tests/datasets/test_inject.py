@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.datasets.inject import JOINT_KINDS, InjectOptions, inject_channel, inject_joint, join_injected
+from enhsim_tf.datasets.inject import inject_channel, inject_joint, join_injected
+from enhsim_tf.datasets.inject_options import JOINT_KINDS, InjectOptions
 from enhsim_tf.datasets.label_columns import LABELS, series_table, write_table
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.series import Telemetry
@@ -57,20 +58,6 @@ def test_channels_draw_independently_and_the_same_seed_gives_the_same_table():
     assert (amps["mask"].to_numpy() != first["mask"].to_numpy()).any()
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_a_file_holds_what_the_frame_holds(suffix, tmp_path):
-    frame = inject_channel(parts(), InjectOptions(("gain", "spike"), number=4))
-    write_table(tmp_path / f"labelled{suffix}", frame)
-    if suffix == ".csv":
-        read = pd.read_csv(tmp_path / "labelled.csv", parse_dates=["time"], dtype={"value": np.float32, "onset": "Int32", "end": "Int32"})
-    else:
-        read = pd.read_parquet(tmp_path / "labelled.parquet")
-    assert list(read) == ["time", "value", *LABELS] and [path.name for path in tmp_path.iterdir()] == [f"labelled{suffix}"]
-    for name in ("value", "onset", "end", "mask"):
-        assert read[name].tolist() == frame[name].tolist()
-    assert read["scenario"].astype(str).tolist() == frame["scenario"].astype(str).tolist()
-
-
 @pytest.mark.parametrize("times", [True, False])
 def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refused):
     volts, amps = (inject_channel(parts(times, False, name), InjectOptions(("level_shift",), number=2)) for name in ("volts", "amps"))
@@ -98,7 +85,6 @@ def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refuse
         {"kinds": ["ramp"], "length": ("long", "long")},
         {"kinds": ["ramp"], "number": 0},
         {"at": ["ramp@1/5"], "number": 3},
-        {"kinds": ["ramp"], "gap": -1},
         {"kinds": ["ramp"], "noise_sd": 0},
         {"at": ["ramp"]},
         {"at": ["rust:4@5/5"]},

@@ -88,5 +88,4 @@ def test_the_lines_say_what_is_covered_and_what_is_left_out():
     assert lines[0].startswith("the training range covers 62.5% of the run (nominal 80.0%, leak 0.0%)")  # 20 of 32 samples; 20 of 25
     assert "5 of 37 samples" in lines[-1] and "shorter than a window of 8" in lines[-1]
     still = Recording((Run(np.full((20, 1), 3, np.float32)),), ("volts",), 10.0, START)
-    assert any("constant in this run" in line and "volts" in line for line in coverage_lines(model(), still))
     assert "extrapolation" in coverage_lines(model(), still)[0]

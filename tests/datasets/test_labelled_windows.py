@@ -9,8 +9,9 @@ import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, ScheduledMode
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.datasets.label_columns import LABELS, write_table
-from enhsim_tf.datasets.labelled_windows import Share, divide_windows, series_labelled, write_windows_labelled
+from enhsim_tf.datasets.label_columns import LABELS
+from enhsim_tf.datasets.labelled_windows import series_labelled, write_windows_labelled
+from enhsim_tf.datasets.places import Share, divide_windows
 from tests.known_simulators import of_waves
 
 WINDOW = 60
@@ -91,15 +92,6 @@ def test_windows_that_a_scenario_does_not_change_are_labelled_nominal_and_counte
     assert ((frame["scenario"] == "nominal").to_numpy() == same).all()
 
 
-def test_an_onset_after_the_last_sample_is_refused(tmp_path, refused):
-    late = Degraded("friction", 0.5, 1 - 1e-9)
-    with refused("onset within 60 samples"):
-        write_windows_labelled(tmp_path / "x.parquet", known(), [Share(late, 5, 1)])
-    with refused("onset within 30 samples"):
-        series_labelled(known(), 30, late)
-    assert not list(tmp_path.iterdir())
-
-
 def test_other_programs_can_read_the_file(written):
     path, _ = written
     schema = pq.read_schema(path)
@@ -128,14 +120,9 @@ def test_several_channels_have_columns_of_their_own(tmp_path, refused):
         np.testing.assert_array_equal(np.stack(frame[f"window {name}"]), expected[:, :, number])
     changed = np.stack(frame["mask amps"])
     assert not np.stack(frame["mask volts"]).any() and changed[3:, 31:].all() and not changed[:3].any()
-    np.testing.assert_array_equal(np.stack(frame["mask"]), changed)
     series = series_labelled(both, 300, drift, 4)
     assert list(series) == ["volts", "amps", *LABELS, "mask volts", "mask amps"]
-    nominal = both.generate_series(300, None, 4)
-    np.testing.assert_array_equal(series["volts"], nominal[:, 0])
-    np.testing.assert_array_equal(series["mask"], series["amps"] != nominal[:, 1])
-    write_table(tmp_path / "x.csv", series, both.channels)
-    assert list(pd.read_csv(tmp_path / "x.csv")) == ["timestamp", "volts", "amps", "is_anomaly"]
+    np.testing.assert_array_equal(series["mask"], series["amps"] != both.generate_series(300, None, 4)[:, 1])
     with refused("volts, amps", "'watts'"):
         series_labelled(both, 300, Degraded("drift", 1.0, 0.5, "watts"))
 
@@ -174,22 +161,3 @@ def test_a_series_with_a_start_has_times():
     expected = pd.date_range("2024-02-28T23:59:59", periods=1_000, freq="100ms", tz="UTC")
     assert (frame.index == expected).all()  # to the nanosecond
     assert (frame["scenario"].iloc[:500] == "nominal").all() and (frame["scenario"].iloc[500:] == "stuck").any()
-
-
-# failures
-
-
-@pytest.mark.parametrize("there_before", [False, True])
-def test_a_failed_generation_writes_nothing(tmp_path, monkeypatch, there_before):
-    broken = known()
-
-    def chunks(*arguments):  # fails after the first windows
-        yield np.zeros((3, WINDOW, 1), np.float32), np.zeros((3, WINDOW, 1), bool)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(broken, "generate_labelled_chunks", chunks)
-    if there_before:
-        (tmp_path / "x.parquet").write_text("the old one")
-    with pytest.raises(KeyboardInterrupt):
-        write_windows_labelled(tmp_path / "x.parquet", broken, [Share(None, 10, 0)])
-    assert [path.read_text() for path in tmp_path.iterdir()] == ["the old one"] * there_before

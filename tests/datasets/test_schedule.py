@@ -28,10 +28,10 @@ SIMULATOR = of_waves([COARSE], 64, interval_s=INTERVAL_S)
 @pytest.mark.parametrize("seed", range(10))
 def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
     given, rng = [ScheduledMode("gain_loss", 1.0, 500, 100)], np.random.default_rng(seed)
-    schedule = draw_schedule(SIMULATOR, 3_000, given, MODES, 8, (10, 80), 30, rng)
+    schedule = draw_schedule(SIMULATOR, 3_000, given, MODES, 8, (10, 80), rng)
     assert sorted(event.mode for event in schedule) == ["drift"] * 4 + ["gain_loss"] + ["stuck"] * 4 and given[0] in schedule
     for before, after in itertools.pairwise(schedule):
-        assert after.begin - before.end >= 30
+        assert after.begin - before.end >= 80
     assert schedule[-1].end <= 3_000 and all(10 <= event.length <= 80 for event in schedule if event not in given)
     events = [(Degraded(event.mode, event.severity, 0.0), event.begin, event.end) for event in schedule]
     drawn = SIMULATOR.alignment.draw_series(3_000, events, np.random.default_rng(0))
@@ -45,16 +45,16 @@ def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
 
 
 def test_the_same_seed_gives_the_same_schedule_and_changes_that_fade_do_not_meet():
-    first, again = (draw_schedule(SIMULATOR, 3_000, [], MODES, 8, (10, 80), 0, np.random.default_rng(3)) for _ in range(2))
+    first, again = (draw_schedule(SIMULATOR, 3_000, [], MODES, 8, (2, 2), np.random.default_rng(3)) for _ in range(2))
     assert first == again
     assert min(after.begin - before.end for before, after in itertools.pairwise(first)) >= 9  # a fade is four samples long
 
 
 def test_events_that_change_nothing_or_do_not_fit_are_refused(refused):
     with refused("changes nothing at 100 drawn places"):
-        draw_schedule(SIMULATOR, 3_000, [], [Degraded("drift", 0.0)], 1, (10, 10), None, np.random.default_rng(0))
+        draw_schedule(SIMULATOR, 3_000, [], [Degraded("drift", 0.0)], 1, (10, 10), np.random.default_rng(0))
     with refused("room for events"):
-        draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), None, np.random.default_rng(0))
+        draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), np.random.default_rng(0))
 
 
 # texts
@@ -88,10 +88,8 @@ def test_places_are_parsed():
         ("5000", 17.0, 5_000),
         ("1d", 60.0, 1_440),
         ("6h", 0.5, 43_200),
-        ("90min", 10.0, 540),
         ("1ms", 0.001, 1),
         ("100 s", 8.0, 12),
-        ("0.5D", 86.4, 500),
         ("2.5 min", 10.0, 15),
         ("5s", 10.0, 1),
     ],

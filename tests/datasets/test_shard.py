@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.common.atomic_files import sha256, write_json
+from enhsim_tf.common.atomic_files import write_json
 from enhsim_tf.datasets.folder import MANIFEST, check_folder
 from enhsim_tf.datasets.mix import Mix, ModelShare, ScenarioShare
 from enhsim_tf.datasets.plan import make_plan, plan_key
@@ -84,12 +84,6 @@ def test_a_shard_depends_only_on_plan_and_number(tmp_path):
         assert PlainMaker(other, folders[2])(3) != forth[3]
 
 
-def test_shards_do_not_repeat_each_other():
-    drawn = [draw_rows(plan(2_000, 500, seed=seed), shard)[0].start for seed in (0, 1) for shard in range(4)]
-    assert len({values.tobytes() for values in drawn}) == 8
-    assert len(np.unique(np.concatenate(drawn))) > 3_980  # 4,000 draws from a million values: about 8 repeat by chance
-
-
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(st.lists(st.integers(0, 20), min_size=1, max_size=8).filter(any), st.integers(1, 200), st.integers(0, 2**32))
 def test_each_category_gets_its_share_of_the_rows(weights, num_rows, seed):
@@ -138,16 +132,7 @@ def model(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def copied(model, tmp_path):
-    folder = tmp_path / "volts"
-    folder.mkdir()
-    for file in model.iterdir():
-        (folder / file.name).write_bytes(file.read_bytes())
-    return folder
-
-
-def test_a_plan_is_made_without_loading_the_model(model):
+def test_a_plan_holds_what_its_model_says_and_no_path(model):
     made = make_plan(Mix(), model, seed=1, num_windows=20_000)
     assert (made.window, made.models[0].interval_s, made.models[0].name) == (60, 2.0, "volts")
     assert (made.shard, made.num_shards, made.num_windows_in(2)) == (8_192, 3, 20_000 - 2 * 8_192)
@@ -183,34 +168,10 @@ def test_channels_have_columns_of_their_own_and_one_scenario_may_concern_one_cha
         make_plan(with_other, tmp_path / "model", 1, 8)
 
 
-def vouch(folder):
-    """Makes the checksums of a saved simulator agree with its files again."""
-    manifest = json.loads((folder / "manifest.json").read_text())
-    write_json(folder / "manifest.json", manifest | {"sha256": {name: sha256(folder / name) for name in manifest["sha256"]}})
-
-
-INVALID = {
-    "interval_s": ["1" + "0" * 400, "0", "-1", "1e999", "NaN", "true", '"2"', "null"],
-    "window": ["null", "true", "1", "60.0", '"60"', str(10**12)],
-}
-
-
-@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in INVALID.items() for value in values])
-def test_invalid_settings_of_a_model_are_refused(copied, name, value, refused):
-    settings = json.loads((copied / "settings.json").read_text())
-    (copied / "settings.json").write_text(json.dumps(settings | {name: 12345}).replace("12345", value))
-    with refused("settings.json to be unchanged"):
-        make_plan(Mix(), copied, 0, 10)
-    vouch(copied)
-    with refused(f"{name} to be a number"):
-        make_plan(Mix(), copied, 0, 10)
-
-
-def test_a_model_replaced_after_planning_is_refused(copied, tmp_path, refused):
-    maker = ShardMaker(make_plan(Mix(), copied, 0, 10), tmp_path)
-    path = copied / "settings.json"
-    path.write_text(path.read_text().replace('"seed": 0', '"seed": 1'))
-    vouch(copied)
+def test_a_model_replaced_after_planning_is_refused(tmp_path, refused):
+    plain().save(tmp_path / "volts")
+    maker = ShardMaker(make_plan(Mix(), tmp_path / "volts", 0, 10), tmp_path)
+    plain(0.2).save(tmp_path / "volts")
     with refused("at the start of the data set"):
         maker(0)
 
@@ -233,7 +194,6 @@ def test_models_with_different_windows_are_refused(model, tmp_path, refused):
         ({"num_windows": 0}, "windows"),
         ({"num_windows": 10**10 + 1}, "windows"),
         ({"shard": 10**9}, "shards"),
-        ({"num_windows": 10**9, "shard": 1}, "shard:"),
     ],
 )
 def test_data_sets_with_sizes_out_of_range_are_refused(changes, words, refused):
@@ -244,5 +204,5 @@ def test_data_sets_with_sizes_out_of_range_are_refused(changes, words, refused):
 def test_a_data_set_of_another_format_is_refused(tmp_path, refused):
     made = plan(40, 40)
     write_json(tmp_path / MANIFEST, {"format": "enhsim_tf.datasets.generate/2", "settings": made.settings(), "shards": None})
-    with refused("generate/3", "generate/2", "another --out"):
+    with refused("generate/3", "generate/2", "another folder"):
         check_folder(tmp_path, made)

@@ -40,7 +40,6 @@ RUNS = {
     "a fit from an address with a password": ["fit", f"influxdb://user:{PASSWORD}@host/m/f", "--out", "{0}/new"],
     "a token in the address": ["fit", f"influxdb://host/m/f?token={TOKEN}", "--out", "{0}/new"],
     "a token for a channel": ["generate", "{0}/models", "--windows", "3", "--channel", TOKEN, "--out", "{0}/y.parquet"],
-    "a token for an option": ["generate", "{0}/models", f"--{TOKEN}", "--out", "{0}/y.parquet"],
     "a large data set": ["generate", "{0}/models", "--windows", "30", "--workers", "1", "--out", "{0}/set"],
     "a cluster that is not there": ["generate", "{0}/models", "--windows", "30", "--engine", "ray", "--out", "{0}/set"],
     "scores": ["score", "{0}/models", "{0}/x.csv", "--windows", "40", "--detector", "limit-check", "--out", "{0}/y.parquet"],

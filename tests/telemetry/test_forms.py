@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.datasets.inject import InjectOptions, inject_channel
+from enhsim_tf.datasets.inject import inject_channel
+from enhsim_tf.datasets.inject_options import InjectOptions
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.times import epoch_unit

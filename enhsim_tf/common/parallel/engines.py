@@ -33,20 +33,14 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
     """
     if engine not in ENGINES:
         raise InputError(f"Expected an engine, one of: {', '.join(ENGINES)}. Received: {engine!r}.")
-    _check_workers(engine, workers)
     return {"local": run_local, "ray": run_ray}[engine](pickle.dumps(work), iter(items), workers)
-
-
-def _check_workers(engine: str, workers: int | None) -> None:
-    if workers is not None and not 1 <= workers <= ENGINES[engine]:
-        raise InputError(f"Expected from 1 to {ENGINES[engine]:,} workers, or auto. Received: {workers}.")
 
 
 def parse_workers(text: str | None, engine: str | None = None) -> int | None:
     """Parses the option `--workers auto|N`, for the engine `local` if none is given: a number, or None for one per CPU."""
     if text in (None, "auto"):
         return None
-    if not (text.isascii() and text.isdecimal() and 1 <= len(text) <= 9 and int(text)):
-        raise InputError(f"Expected --workers auto, or a number of them. Received: {text!r}.")
-    _check_workers(engine or "local", int(text))
+    most = ENGINES[engine or "local"]
+    if not (text.isascii() and text.isdecimal() and len(text) <= 9 and 1 <= int(text) <= most):
+        raise InputError(f"Expected --workers auto, or a number from 1 to {most:,}. Received: {text!r}.")
     return int(text)

@@ -18,12 +18,8 @@ _ANSWER_S = 10
 _REFUSALS = (ConnectionError, RuntimeError, OSError, ValueError)
 
 
-def _call(work: bytes, item: Any) -> tuple[str, Any]:
-    """Returns `("done", result)`, or `("refused", message)` after an `InputError`, which Ray would wrap in an error of its own."""
-    try:
-        return "done", start_worker(work)(item)
-    except InputError as error:
-        return "refused", str(error)
+def _call(work: bytes, item: Any) -> Any:
+    return start_worker(work)(item)
 
 
 def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
@@ -45,11 +41,11 @@ def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[
                     return
                 (done,), _ = ray.wait(list(running), num_returns=1)
                 try:
-                    kind, result = ray.get(done)
+                    result = ray.get(done)
                 except lost as error:
                     raise ProcessesDiedError([running[done]], _last_line(error)) from None
-                if kind == "refused":
-                    raise InputError(result)
+                except ray.exceptions.RayTaskError as error:
+                    raise error.cause from None  # as the work has raised it
                 del running[done]
                 yield result
         finally:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Sequence
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import DAYS, UNITS_NS
 
 _CHOICES = {
     "on_bad_times": ("refuse", "drop"),
@@ -14,6 +13,7 @@ _CHOICES = {
     "labelled": ("keep", "missing"),
     "decimal": (None, ".", ","),
 }
+_TIME_UNITS = "D h min s ms us ns excel mjd jd datenum".split()  # the keys of `times.UNITS_NS` and `times.DAYS`, whose import is slow
 _MAX_FILL = {"linear": 5, "hold": 1_000_000}
 _NAMES = ("label_column", "series_column", "value_column")
 
@@ -78,11 +78,10 @@ class Cleaning:
             raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
         if not (0 <= self.max_jitter <= 0.5 and self.longest_gap >= 0 and self.min_part >= 1):
             raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
-        form, units = self.time_format, (*UNITS_NS, *DAYS)
-        if form is not None and form not in units and "%" not in form:
+        if self.time_format is not None and self.time_format not in _TIME_UNITS and "%" not in self.time_format:
             raise InputError(
                 "Expected time_format as datetime.strptime takes it, such as '%d.%m.%Y %H:%M:%S', or one of: "
-                f"{', '.join(units)}. Received: time_format={form!r}."
+                f"{', '.join(_TIME_UNITS)}. Received: time_format={self.time_format!r}."
             )
         for name in _NAMES:
             given = getattr(self, name)

@@ -1,0 +1,132 @@
+"""Checks of the options of each command that need no data. They come before the imports of the command, which are slow."""
+
+import argparse
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.parallel.engines import parse_workers
+from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.simulator.options import FitOptions, ScoreOptions, options_from
+from enhsim_tf.telemetry.cleaning.options import Cleaning
+
+_OF_RUNS = "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values"
+_NOT_OF_RUNS = "windows continuous start scenario at number timeeval nominal_share workers engine scenarios".split()
+_MOST_EVENTS = 10_000
+
+
+def check(options: argparse.Namespace) -> argparse.Namespace:
+    """Checks the options of a command, and replaces texts by what they say, such as `options.scenario` by a list of `Degraded`.
+
+    Raises:
+        InputError: If a value is out of range, or options contradict each other.
+    """
+    if options.seed is not None and not 0 <= options.seed < 2**31:
+        raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
+    checks = {"fit": _check_fit, "generate": _check_generate, "score": _check_score, "update": _check_update, "inject": _check_inject}
+    if options.command in checks:
+        checks[options.command](options)
+    return options
+
+
+def _check_fit(options: argparse.Namespace) -> None:
+    options.chosen = options_from(options, FitOptions)
+    if options.coarse is None:
+        _refuse(options, "without --coarse", "coarse_time", "coarse_start", "coarse_column", "delay_s")
+    options.workers = parse_workers(options.workers, options.engine)
+    options.cleaning = cleaning_options(options, options.window or 32, "missing")
+
+
+def _check_score(options: argparse.Namespace) -> None:
+    named = {option_name(name): name for name in (RESIDUAL, *all_detectors())}
+    options.chosen = ScoreOptions(named.get(options.detector), options.num_windows, options.false_alarm_rate, options.seed)
+    options.cleaning = cleaning_options(options, 2)
+
+
+def _check_update(options: argparse.Namespace) -> None:
+    FitOptions(held_out=options.held_out, seed=options.seed)  # checks both
+    options.cleaning = cleaning_options(options, 2, "missing")
+
+
+def _check_inject(options: argparse.Namespace) -> None:
+    from enhsim_tf.datasets.inject_options import INJECTIONS, InjectOptions
+    from enhsim_tf.datasets.places import split_limits
+
+    kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
+    least, greatest = split_limits("severity", options.severity)
+    try:
+        severity = float(least), float(greatest)
+    except ValueError:
+        raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
+    length = split_limits("length", options.length)
+    options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed)
+    options.cleaning = cleaning_options(options, 3)
+
+
+def _check_generate(options: argparse.Namespace) -> None:
+    options.cleaning = cleaning_options(options, 2)
+    if options.coarse is not None:
+        _refuse(options, "with --coarse, because the run gives length, times and labels", *_NOT_OF_RUNS)
+        return
+    _refuse(options, "without --coarse", *_OF_RUNS)
+    options.is_large = bool(options.workers or options.engine or options.scenarios)
+    if options.scenarios is not None:
+        _refuse(options, "with --scenarios, whose file gives them", "scenario", "nominal_share")
+    if options.continuous is None:
+        _refuse(options, "without --continuous", "start", "at", "number", "timeeval")
+        if options.windows is None and options.scenarios is None:
+            raise InputError("Expected --windows or --continuous. Received: neither. Give one of them.")
+    else:
+        _refuse(options, "with --continuous, which makes one series", "nominal_share", "workers", "engine", "scenarios")
+    if not options.scenario:
+        _refuse(options, "without --scenario", "nominal_share")
+    options.nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
+    if not 0 <= options.nominal_share <= 1:
+        raise InputError(f"Expected a nominal share from 0 to 1. Received: {options.nominal_share}.")
+    options.workers = parse_workers(options.workers, options.engine)
+    from enhsim_tf.datasets.places import divide_windows, parse_scenario  # imports NumPy, so it comes last
+
+    options.scenario = [parse_scenario(text) for text in options.scenario]
+    if options.continuous is not None:
+        _check_series(options)
+    elif not options.is_large:
+        options.shares = divide_windows(options.scenario, options.nominal_share, options.windows, options.seed or 0)
+
+
+def _check_series(options: argparse.Namespace) -> None:
+    from enhsim_tf.coarse_simulator.degraded import Degraded
+    from enhsim_tf.datasets.places import parse_length, parse_place, parse_start, split_limits
+
+    if options.number is None and (len(options.scenario) > 1 or (options.scenario and options.at)):
+        raise InputError(
+            "Expected --number, of events at drawn places, with several --scenario in a series, or with --scenario and --at. Received: none."
+        )
+    if options.number is not None and not (1 <= options.number <= _MOST_EVENTS and options.scenario):
+        raise InputError(f"Expected --number from 1 to {_MOST_EVENTS:,}, with --scenario. Received: --number {options.number}.")
+    options.at = [parse_place(text, 1.0) for text in options.at]
+    for place in options.at:
+        Degraded(place.kind, place.severity)  # checks both
+    options.length = split_limits("length", options.length)
+    options.start = None if options.start is None else parse_start(options.start)
+    parse_length(options.continuous)
+
+
+def _refuse(options: argparse.Namespace, when: str, *names: str) -> None:
+    """Refuses options that are given."""
+    for name in names:
+        if getattr(options, name) not in (None, [], False):
+            word = name.removesuffix("_s").replace("_", "-")
+            raise InputError(f"Expected no --{word} {when}. Received: --{word}. Leave it out.")
+
+
+def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:
+    """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
+    bad = "drop" if options.drop_bad else "refuse"
+    same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill".split()
+    return Cleaning(
+        **{name: getattr(options, name) for name in same if hasattr(options, name)},
+        interval_s=getattr(options, "interval", None),
+        labelled=labelled,
+        missing_values=tuple(value for values in options.missing_values for value in values.split(",")),
+        on_bad_times=bad,
+        on_bad_values=bad,
+        min_part=min_part,
+    )
