@@ -25,6 +25,7 @@ from enhsim_tf.common.errors import InputError  # noqa: E402
 ROOT = Path(__file__).parents[1]
 SLOW = "--slow"
 TOGETHER = ("paper", "simulator")  # folders whose files share fixtures that take seconds: a process runs all of a folder
+LEFT = pytest.StashKey[int]()
 
 
 def pytest_addoption(parser):
@@ -37,9 +38,23 @@ def pytest_collection_modifyitems(config, items):
         left = [item for item in items if item.get_closest_marker("slow")]
         config.hook.pytest_deselected(items=left)
         items[:] = [item for item in items if item not in left]
+        config.stash[LEFT] = len(left)
+        if hasattr(config, "workeroutput"):  # a process of xdist, which tells the first one
+            config.workeroutput["left"] = len(left)
     for item in items:
         folder = item.path.parent.name
         item.add_marker(pytest.mark.xdist_group(folder if folder in TOGETHER else item.nodeid.partition("::")[0]))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    """Takes the number of tests that a process of xdist left out; all processes have the same."""
+    node.config.stash[LEFT] = getattr(node, "workeroutput", {}).get("left", 0)
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if left := config.stash.get(LEFT, 0):
+        terminalreporter.write_line(f"{left} slow tests were left out. To run them: python -m pytest {SLOW} -m slow")
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -60,9 +60,15 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
     running = engines.run(engine, ShardMaker(plan, out), missing, workers)  # starts no worker if no shard is missing
     with open_journal(out) as write, contextlib.closing(running):
         for record in running:
-            if not (out / shard_file(record.shard)).is_file():
+            name, before = shard_file(record.shard), recorded.get(record.shard, record)
+            if before.sha256 != record.sha256 and before.rows == record.rows:
                 raise InputError(
-                    f"Expected {shard_file(record.shard)} in {out} after it was written. Received: no such file, because another machine wrote it elsewhere. "
+                    f"Expected {name} to match its record in {out}. Received: other bytes, because this machine computes "
+                    "different results or the record is damaged. Remove the folder, or give another --out, and run the same command again."
+                )
+            if not (out / name).is_file():
+                raise InputError(
+                    f"Expected {name} in {out} after it was written. Received: no such file, because another machine wrote it elsewhere. "
                     "Give an --out that all machines share."
                 )
             write(record)

@@ -93,8 +93,9 @@ def draw_schedule(
 ) -> list[ScheduledMode]:
     """Adds events at drawn places to those at given places, in the order of time.
 
-    The modes are used in turn. The longest events are placed first, each uniformly among all places that are free, at the distance of the greatest length. A place where
-    the mode would not change the coarse run is drawn again: for example, `stuck` changes nothing while the mechanism stands still.
+    The modes are used in turn. The longest events are placed first, each uniformly among all places that are free and at least the
+    greatest length away from other events. A place where the mode would not change the coarse run is drawn again: for example, `stuck`
+    changes nothing while the mechanism stands still.
 
     Args:
         simulator: The simulator, whose series begins at time 0.

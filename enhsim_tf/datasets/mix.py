@@ -1,5 +1,6 @@
 """The mix of a large data set, from the options or from a scenario file (docs/large_data_sets.md): scenarios, models and their shares."""
 
+import collections
 import dataclasses
 import math
 import os
@@ -127,12 +128,18 @@ def _shown(received: Any) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """The safe loader without aliases, which multiply what is written."""
+    """The safe loader without aliases, which multiply what is written, and without repeated keys, of which one would be lost."""
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
         if self.check_event(yaml.AliasEvent):
             raise yaml.MarkedYAMLError(problem="an alias", problem_mark=self.peek_event().start_mark)
         return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        counts = collections.Counter(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+        if twice := [key for key, count in counts.items() if count > 1]:
+            raise yaml.MarkedYAMLError(problem=f"the key {twice[0][:40]!r} stands there twice", problem_mark=node.start_mark)
+        return super().construct_mapping(node, deep)
 
 
 def _load(path: Path) -> Any:

@@ -157,6 +157,13 @@ def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp
     assert not here
 
 
+def test_a_shard_that_does_not_match_its_record_is_an_error(undisturbed, tmp_path, here, refused):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    change_manifest(folder, lambda manifest: manifest["shards"][4].update(sha256="0" * 64))
+    with refused(shard_file(4), "computes different results"):
+        generate_data_set(folder, plan())
+
+
 def test_a_shard_written_to_the_disk_of_another_machine_is_an_error(tmp_path, monkeypatch, refused):
     monkeypatch.setattr(generate.engines, "run", lambda *arguments: (record for record in [Record(3, 50, "0" * 64)]))
     with refused(shard_file(3), "all machines share"):

@@ -90,6 +90,7 @@ MISTAKES = {
     "two models of one name": (changed("models", 1, "name", to="a"), ["same name"]),
     "a list at the top": ([1], ["keys and values"]),
     "nothing": ("", ["keys and values"]),
+    "a key twice": ("seed: 1\nseed: 2\n", ["twice", "seed", "line 1"]),
     "no YAML": ("windows: [1\nseed: 2", ["line 2"]),
     "aliases that multiply": ("a: &a [1,1,1]\nb: &b [*a,*a,*a]\nscenarios: [*b,*b]\n", ["alias", "line 2"]),
     "a tag that runs code": ("windows: !!python/object/apply:os.system ['true']\n", ["tag", "line 1"]),
