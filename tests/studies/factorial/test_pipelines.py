@@ -50,7 +50,6 @@ def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable
     assert np.array_equal(Pipelines(one.replicate).arm(cell, TRAINING), first)
 
 
-@pytest.mark.slow
 def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_path, monkeypatch):
     def judged(self, cell):
         alarms = {"coarse": 50, "real": 1}.get(cell, 9)
@@ -68,7 +67,7 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("narrow_networks")
+@pytest.mark.usefixtures("narrow_enhancer")
 def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_coarse_reference(tmp_path):
     settings = make_settings("smoke", paper__hidden_units=64, **SMALL).of("shot", 0)
     one = Pipelines(Replicate(settings, Stages(tmp_path)))

@@ -21,7 +21,7 @@ SMALL = {"paper__num_windows": 40, "modes__num_learnt": 90, "robustness__num_win
 SMALL |= {"robustness__num_seeds": 1, "paper__iterations": 1, "paper__record_every": 1, "paper__hidden_units": 64}
 
 
-@pytest.mark.usefixtures("narrow_networks")
+@pytest.mark.usefixtures("narrow_enhancer")
 def test_every_table_has_every_row_and_a_second_run_trains_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(replicate, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")})
     options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
