@@ -36,6 +36,17 @@ def test_the_published_findings_are_those_of_the_published_tables(study, near):
     assert again == near(shared(kept, again)) and kept["budget"] == "full"
 
 
+def test_the_main_findings_on_references_and_sources_are_those_of_the_published_table(near):
+    summary = importlib.import_module("studies.reference_or_source.summary")
+    table = summary.KEPT.read(PUBLISHED / "reference_or_source" / "results")["alarms"]
+    found = summary.summarise({"alarms": table[(table["axis"] == "main") & (table["simulator"] == "wrong physics")]})
+    for system, about in found["systems"].items():
+        kept = findings("reference_or_source")["systems"][system]
+        points = {(each["axis"], each["simulator"], each["units"]): each for each in kept["points"]}
+        kept["points"] = [points[each["axis"], each["simulator"], each["units"]] for each in about["points"]]
+        assert kept == near(about)
+
+
 @pytest.mark.parametrize("regime", ["gentle", "hard"])
 def test_the_errors_and_times_of_the_battery_that_are_no_longer_computed_are_those_of_its_tables(regime):
     folder, found = PUBLISHED / "battery" / "results", findings("battery")["regimes"][regime]
