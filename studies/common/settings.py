@@ -35,7 +35,7 @@ class RobustnessSettings:
 
 @dataclasses.dataclass(frozen=True)
 class SecondSettings:
-    """The residual pipeline of the factorial study: noise is the residual of the enhancer, and the convolutional GAN learns it."""
+    """The residual pipeline of the factorial study: noise is the residual of the enhancer."""
 
     num_windows: int = setting(15_000, "windows: more windows, so that the enhancer does not memorise their noise", smoke=60)
     epochs: int = setting(2, "epochs: fewer epochs: half the paper's steps, with a decaying learning rate")
@@ -80,7 +80,7 @@ class FewWindowsSettings:
 class FactorialSettings:
     """The factorial study: `python -m studies.factorial`. Its other settings are those of robustness."""
 
-    num_seeds: int = setting(5, "seeds: 32 cells for each", smoke=1)
+    num_seeds: int = setting(5, "seeds: 24 cells for each", smoke=1)
     first_seed: int = setting(2_000, "seed: designs were chosen on 100 to 199")
     max_order: int = setting(200, "samples: largest order of the fitted autoregression; AIC selects the order", smoke=40)
 
