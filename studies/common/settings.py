@@ -134,7 +134,7 @@ class Settings:
     """The settings of the paper's pipeline, the kind of noise in its telemetry, and the settings of each study."""
 
     paper: of_paper.Settings
-    noise: str = setting("white", "kind of noise: the simplest; `environments.FAMILIES` has others")
+    noise: str = setting("white", "kind of noise: the simplest; `noise_processes.GALLERY` has others")
     second: SecondSettings = SecondSettings()
     robustness: RobustnessSettings = RobustnessSettings()
     modes: ModesSettings = ModesSettings()

@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from studies.common.environments import NOISES
+from studies.common.noise_processes import NOISES
 from studies.common.statistics import mean_interval, t_interval
 from studies.common.tables import KeptTables
 from studies.factorial.cells import (

@@ -3,6 +3,7 @@
 import argparse
 import json
 
+import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES
@@ -31,6 +32,8 @@ def test_every_table_has_every_row_and_a_second_run_trains_nothing(tmp_path, mon
     assert len(tables["alarms"]) == detectors * 10 and len(tables["recall"]) == detectors * 8 * 5
     assert (tables["alarms"].groupby(["arm", "detector"])["windows"].sum() == 59).all()  # disjoint windows of a quarter of 120,000 samples
     assert len(tables["degraded"]) == len(METHODS) * (1 + len(MODES) * len(SEVERITIES))
+    # of two sines of amplitudes a the square waves miss sqrt(1.5 - 4 / pi) a, each on its own; the signal is a / sqrt(2)
+    assert first["modes"]["nrmse"]["coarse"]["nominal"] == pytest.approx(np.sqrt(3 - 8 / np.pi), rel=0.05)
     assert first["budget"] == "smoke" and json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == first
     assert 'id="watermark"' in (tmp_path / "false_alarms.svg").read_text(encoding="utf-8")
     capsys.readouterr()
