@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.paper import settings as of_paper
 
 
@@ -162,6 +163,9 @@ def make_settings(budget: str = "full", **changed: Any) -> Settings:
     Args:
         budget: `full`, or `smoke` for smaller counts.
         **changed: Values as `group__field=value`, for example `robustness__num_seeds=2` or `paper__seed=1`.
+
+    Raises:
+        InputError: If a group does not exist.
     """
     values: dict[str, dict[str, Any]] = {}
     for name, value in changed.items():
@@ -174,4 +178,6 @@ def make_settings(budget: str = "full", **changed: Any) -> Settings:
         fields = {field.name: field.metadata["smoke"] for field in dataclasses.fields(kind)}
         smaller = {field: count for field, count in fields.items() if budget == "smoke" and count is not None}
         made[name] = kind(**smaller | values.pop(name, {}))
-    return Settings(**made, **values, budget=budget)
+    if values:
+        raise InputError(f"Expected settings of one of the groups paper, {', '.join(groups)}. Received: {min(values)!r}.")
+    return Settings(**made, budget=budget)

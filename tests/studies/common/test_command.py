@@ -24,7 +24,9 @@ def test_what_cannot_be_done_is_refused_in_one_line(study, words, capsys, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-def test_a_budget_and_changes_reach_their_groups():
+def test_a_budget_and_changes_reach_their_groups(refused):
     made = make_settings("smoke", paper__seed=4, robustness__num_seeds=7)
     assert (made.seed, made.paper.epochs, made.robustness.num_seeds, made.robustness.num_windows) == (4, 2, 7, 200)
     assert made.of("shot", 9).noise == "shot" and made.of("shot", 9).seed == 9
+    with refused("'noise'"):
+        make_settings(noise="shot")
