@@ -1,16 +1,11 @@
-"""The volume under a surface and the recall at the real rate, compared with cases by hand and a direct implementation of VUS-PR."""
+"""The volume under a surface, compared with a case by hand and a direct implementation of VUS-PR."""
 
 import math
 
 import numpy as np
 import pytest
 
-from studies.common.metrics import recall_at_real_rate, vus_pr
-
-
-def test_recall_at_the_real_rate_by_hand():
-    assert recall_at_real_rate(np.arange(99), [97.5, 98, 98.5, 200], rate=0.01) == 0.5  # the threshold is 98
-    assert recall_at_real_rate(np.arange(199), [197.5, 196.5]) == 0.5  # by default 1 %: the threshold is 197
+from studies.common.metrics import vus_pr
 
 
 def volume_by_the_definition(labels, ranges, scores, max_buffer):

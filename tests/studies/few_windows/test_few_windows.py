@@ -5,12 +5,11 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.common.stages import Stages
 from enhsim_tf.telemetry.series import Telemetry
 from studies.common.settings import make_settings
 from studies.few_windows import summary
-from studies.few_windows.cells import QUICK, World
-from studies.few_windows.record import CORAL, NOISE_MODELS, REAL, SIMULATOR, Record, coral_alignment
+from studies.few_windows.cells import World
+from studies.few_windows.record import REAL, SIMULATOR, Record, coral_alignment
 
 
 def test_the_simulator_of_a_record_generates_its_signal_and_its_noise():
@@ -33,18 +32,6 @@ def test_aligned_windows_have_the_mean_and_the_covariance_of_the_target():
     aligned = coral_alignment(source, target)(source)
     np.testing.assert_allclose(aligned.mean(axis=0), target.mean(axis=0), atol=0.05)
     np.testing.assert_allclose(np.cov(aligned.T), np.cov(target.T), atol=0.02 * np.abs(np.cov(target.T)).max())
-
-
-@pytest.mark.slow
-def test_a_cell_has_all_training_data_and_is_read_from_the_cache(tmp_path):
-    counts = {"num_real": (6,), "first_seed": 3, "num_windows": 30, "num_judged": 20, "num_anomalous": 6}
-    changed = {f"few_windows__{name}": value for name, value in counts.items()}
-    settings = make_settings("smoke", paper__window=48, **changed).of("shot", 3)
-    first, again = (World(settings).rows(6, Stages(tmp_path)) for _ in range(2))
-    pd.testing.assert_frame_equal(first, again)
-    arms = (REAL, *(SIMULATOR + name for name in NOISE_MODELS), CORAL)
-    assert list(zip(first["arm"], first["detector"], strict=True)) == [(arm, detector) for arm in arms for detector in QUICK]
-    assert (first["windows"] == 20).all() and (first["num_real"] == 6).all() and (first["environment"] == "shot").all()
 
 
 def test_the_record_ends_before_the_judged_windows():
