@@ -4,8 +4,10 @@ Each implementation must run as its users would run it. If enhsim_tf were import
 start with the settings of enhsim_tf.
 """
 
+import os
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,18 +20,19 @@ Work = tuple[Callable[[], object], int]
 
 The function may return the seconds that it took, as a float, where not all of its time counts.
 """
+WINDOW, HIDDEN_UNITS, FILTERS = 500, 3_200, 500  # of the paper's networks
 
 
-def example_windows(num_windows: int, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns coarse windows and noisy target windows like those of the paper, float32 of shape `(num_windows, window)`."""
+def example_windows(num_windows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns coarse windows and noisy target windows like those of the paper, float32 of shape `(num_windows, WINDOW)`."""
     rng = np.random.default_rng(0)
-    phase = 2 * np.pi * (rng.integers(0, 480, num_windows)[:, None] + np.arange(window)) / 480
+    phase = 2 * np.pi * (rng.integers(0, 480, num_windows)[:, None] + np.arange(WINDOW)) / 480
     coarse = 0.5 * np.sign(np.sin(phase)) + 0.25 * np.sign(np.sin(4 * phase))
     truth = 0.5 * np.sin(phase) + 0.25 * np.sin(4 * phase)
     return coarse.astype(np.float32), (truth + rng.normal(0, 0.1, truth.shape)).astype(np.float32)
 
 
-def gan_networks(keras: Any, window: int, filters: int, dropout: float) -> tuple["keras.Model", "keras.Model"]:
+def gan_networks(keras: Any, dropout: float = 0.0) -> tuple["keras.Model", "keras.Model"]:
     """Builds the paper's generator and discriminator with a Keras of any age."""
     layers, kernel = keras.layers, {"kernel_initializer": "he_uniform"}
     drop = (lambda: [layers.Dropout(dropout)]) if dropout else list
@@ -37,12 +40,12 @@ def gan_networks(keras: Any, window: int, filters: int, dropout: float) -> tuple
         keras.Input((16,)),
         layers.Dense(64, activation="relu", **kernel),
         layers.BatchNormalization(),
-        layers.Dense(window, activation="tanh", **kernel),
-        layers.Reshape((window, 1)),
+        layers.Dense(WINDOW, activation="tanh", **kernel),
+        layers.Reshape((WINDOW, 1)),
     ]
     discriminator = [
-        keras.Input((window, 1)),
-        layers.Conv1D(filters, 20, strides=4, activation="relu", **kernel),
+        keras.Input((WINDOW, 1)),
+        layers.Conv1D(FILTERS, 20, strides=4, activation="relu", **kernel),
         *drop(),
         layers.GlobalMaxPooling1D(),
         layers.Dense(25, activation="relu", **kernel),
@@ -62,3 +65,11 @@ def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], float]]:
         times.append(time.perf_counter())
 
     return LambdaCallback(on_epoch_begin=note, on_epoch_end=note), lambda: times[-1] - times[-2]
+
+
+def copy(num_bytes: int) -> Work:
+    """Prepares the limit of the machine for training: all cores copy `num_bytes` in total, without allocating memory."""
+    num_cores = os.cpu_count() or 1
+    source, target = (np.ones((num_cores, num_bytes // 8 // num_cores), np.float32) for _ in range(2))
+    pool = ThreadPoolExecutor(num_cores)
+    return lambda: list(pool.map(np.copyto, target, source)), num_bytes

@@ -5,20 +5,20 @@ import numpy as np
 import tensorflow as tf
 from keras import layers
 
-from benchmarks.examples import Work, epoch_clock, example_windows, gan_networks
+from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work, epoch_clock, example_windows, gan_networks
 
 
-def enhancer(window: int, hidden_units: int) -> keras.Model:
+def enhancer() -> keras.Model:
     """Builds the paper's enhancer."""
-    widths = (window, hidden_units, hidden_units)
+    widths = (WINDOW, HIDDEN_UNITS, HIDDEN_UNITS)
     hidden = [layers.Dense(width, activation="relu", kernel_initializer="he_uniform") for width in widths]
-    return keras.Sequential([keras.Input((window,)), *hidden, layers.Dense(window, kernel_initializer="he_uniform")])
+    return keras.Sequential([keras.Input((WINDOW,)), *hidden, layers.Dense(WINDOW, kernel_initializer="he_uniform")])
 
 
-def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+def enhancer_step(num_steps: int) -> Work:
     """Prepares training steps of the enhancer by `compile("adam", "mse")` and `fit`."""
-    source, target = example_windows(15 * num_steps, window)
-    model = enhancer(window, hidden_units)
+    source, target = example_windows(15 * num_steps)
+    model = enhancer()
     model.compile("adam", "mse")
     clock, seconds_of_last = epoch_clock()
 
@@ -29,9 +29,9 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
     return run, num_steps
 
 
-def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
+def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
     """Prepares GAN iterations by a straightforward `tf.function` with three gradient tapes and the Conv1D layer of Keras."""
-    generator, discriminator = gan_networks(keras, window, filters, dropout)
+    generator, discriminator = gan_networks(keras, dropout)
     loss = keras.losses.BinaryCrossentropy()
     of_discriminator, of_generator = keras.optimizers.Adam(), keras.optimizers.Adam()
     of_discriminator.build(discriminator.trainable_variables)
@@ -50,7 +50,7 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
         of_generator.apply(tape.gradient(value, generator.trainable_variables), generator.trainable_variables)
 
     rng = np.random.default_rng(0)
-    noise = rng.normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
+    noise = rng.normal(0, 0.1, (1_500, WINDOW, 1)).astype(np.float32)
 
     def run() -> None:
         for _ in range(num_iterations):
@@ -59,9 +59,9 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
     return run, num_iterations
 
 
-def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+def enhance_and_noise(num_windows: int) -> Work:
     """Prepares the generation of windows by `predict` of both networks."""
-    enhancing, (generator, _) = enhancer(window, hidden_units), gan_networks(keras, window, 500, 0.0)
-    coarse, _ = example_windows(num_windows, window)
+    enhancing, (generator, _) = enhancer(), gan_networks(keras)
+    coarse, _ = example_windows(num_windows)
     latent = np.random.default_rng(0).normal(size=(num_windows, 16)).astype(np.float32)
     return lambda: enhancing.predict(coarse, verbose=0) + generator.predict(latent, verbose=0)[:, :, 0], num_windows

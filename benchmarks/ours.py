@@ -2,11 +2,10 @@
 
 import os
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from benchmarks.examples import Work, epoch_clock, example_windows
+from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.backend import keras, tf
 from enhsim_tf.common.training import dense_stack, fit_windows
@@ -16,18 +15,18 @@ from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.paper import noise as of_paper
-from enhsim_tf.paper.settings import Settings, make_settings
+from enhsim_tf.paper.settings import make_settings
 from enhsim_tf.simulator.alignment import Waves
 
 
-def _network(window: int, hidden_units: int) -> keras.Model:
-    return dense_stack(window, (window, hidden_units, hidden_units, window), seed=0, name="enhancer")
+def _network() -> keras.Model:
+    return dense_stack(WINDOW, (WINDOW, HIDDEN_UNITS, HIDDEN_UNITS, WINDOW), seed=0, name="enhancer")
 
 
-def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+def enhancer_step(num_steps: int) -> Work:
     """Prepares training steps of 15 windows by `fit_windows`."""
-    source, target = example_windows(15 * num_steps, window)
-    model = _network(window, hidden_units)
+    source, target = example_windows(15 * num_steps)
+    model = _network()
 
     def run() -> float:
         clock, seconds_of_last = epoch_clock()
@@ -37,17 +36,12 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
     return run, num_steps
 
 
-def gan_settings(num_iterations: int = 1_000, **changed: float) -> Settings:
-    """The paper's settings, with two updates of the discriminator on 200 rows in each iteration, as in the compared code."""
-    return make_settings(iterations=num_iterations, record_every=num_iterations, rounds=1, update="two of 200", **changed)
-
-
-def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
-    """Prepares iterations of the paper's GAN, with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
-    settings = gan_settings(num_iterations, dropout=dropout, window=window, filters=filters)
+def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
+    """Prepares iterations of the paper's GAN: two updates of the discriminator on 200 rows and one of the generator, as in the compared code."""
+    settings = make_settings(iterations=num_iterations, record_every=num_iterations, rounds=1, update="two of 200", dropout=dropout)
     gan = of_paper.NoiseGAN(of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings)
     gan.compile()
-    noise = np.random.default_rng(0).normal(0, 0.1, (1_500, window)).astype(np.float32)
+    noise = np.random.default_rng(0).normal(0, 0.1, (1_500, WINDOW)).astype(np.float32)
     rows = of_paper.Rows(noise, settings.rows_of_each_kind, num_iterations, np.random.default_rng(0))
 
     def run() -> None:
@@ -56,50 +50,42 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
     return run, num_iterations
 
 
-def simulator(window: int = 500, hidden_units: int = 3_200) -> EnhancedSimulator:
+def simulator() -> EnhancedSimulator:
     """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
     waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
-    layers = tuple(tuple(layer.get_weights()) for layer in _network(window, hidden_units).layers)
-    enhancer = Enhancer(NETWORK, window, 1, 1, np.zeros(1, np.float32), np.zeros(window, np.float32), layers=layers)
-    residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
-    alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, window)
+    layers = tuple(tuple(layer.get_weights()) for layer in _network().layers)
+    enhancer = Enhancer(NETWORK, WINDOW, 1, 1, np.zeros(1, np.float32), np.zeros(WINDOW, np.float32), layers=layers)
+    residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, WINDOW, 1)).astype(np.float32)
+    alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, WINDOW)
     return EnhancedSimulator(alignment, enhancer, WindowBootstrap(residuals), levels=np.array([[0.0, 1.0]]))
 
 
-def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+def enhance_and_noise(num_windows: int) -> Work:
     """Prepares the enhancement of existing coarse windows by the paper's networks and the generation of their noise, in memory."""
     from enhsim_tf.paper.enhancer import build_enhancer as build
     from enhsim_tf.paper.enhancer import enhance
 
-    settings = make_settings(window=window, hidden_units=hidden_units)
+    settings = make_settings()
     enhancer, generator = build(settings), of_paper.build_generator(settings)
-    coarse = example_windows(num_windows, window)[0]
+    coarse = example_windows(num_windows)[0]
     noise = np.random.default_rng(0)
     return lambda: enhance(enhancer, coarse) + of_paper.generate_noise(generator, num_windows, settings, noise), num_windows
 
 
-def generate(num_windows: int, **size: int) -> Work:
+def generate(num_windows: int) -> Work:
     """Prepares `EnhancedSimulator.generate`, including the coarse simulator, in memory."""
-    made = simulator(**size)
+    made = simulator()
     return lambda: made.generate(num_windows), num_windows
 
 
-def generate_to_parquet(num_windows: int, **size: int) -> Work:
+def generate_to_parquet(num_windows: int) -> Work:
     """Prepares the writing of labelled windows to a Parquet file in a temporary folder."""
-    made, folder = simulator(**size), tempfile.TemporaryDirectory()
+    made, folder = simulator(), tempfile.TemporaryDirectory()
     return lambda: write_windows_labelled(os.path.join(folder.name, "windows.parquet"), made, [Share(None, num_windows, 0)]), num_windows
 
 
-def matrix_product(size: int = 3_200) -> Work:
+def matrix_product() -> Work:
     """Prepares the limit of the machine for generation: a large float32 matrix product, in floating-point operations."""
-    matrix = tf.random.normal((size, size), seed=0)
+    matrix = tf.random.normal((HIDDEN_UNITS, HIDDEN_UNITS), seed=0)
     product = tf.function(lambda: tf.matmul(matrix, matrix)[0, 0])
-    return lambda: product().numpy(), 2 * size**3
-
-
-def copy(num_bytes: int) -> Work:
-    """Prepares the limit of the machine for training: all cores copy `num_bytes` in total, without allocating memory."""
-    num_cores = os.cpu_count() or 1
-    source, target = (np.ones((num_cores, num_bytes // 8 // num_cores), np.float32) for _ in range(2))
-    pool = ThreadPoolExecutor(num_cores)
-    return lambda: list(pool.map(np.copyto, target, source)), num_bytes
+    return lambda: product().numpy(), 2 * HIDDEN_UNITS**3

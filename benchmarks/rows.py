@@ -4,42 +4,20 @@ The compared implementations alternate, so that a change in the speed of the mac
 from two consecutive measurements. The table reports the median and the range of the ratios.
 """
 
-import dataclasses
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks import tool as of_tool
 from benchmarks.worker import Worker
 
-PARAMETERS = 13_697_400
+REPETITIONS = 7
+LAYERS = ((500, 500), (500, 3_200), (3_200, 3_200), (3_200, 500))  # inputs and outputs of each layer of the enhancer
+PARAMETERS = sum(inputs * outputs + outputs for inputs, outputs in LAYERS)
 TRAFFIC = 10 * 4 * PARAMETERS  # bytes of a step: weights are read twice, gradients written once; Adam reads four arrays and writes three
-WINDOW_FLOP = 2 * (500 * 500 + 500 * 3_200 + 3_200 * 3_200 + 3_200 * 500)  # operations of the enhancer for one window
-
-
-@dataclasses.dataclass(frozen=True)
-class Budget:
-    """Numbers of repetitions and sizes, for a full measurement or for a quick run that only shows that everything works."""
-
-    repetitions: int = 7
-    steps: int = 40
-    iterations: int = 5
-    textbook_iterations: int = 3
-    windows: int = 4_096
-    copied_bytes: int = TRAFFIC
-    size: dict = dataclasses.field(default_factory=dict)  # of the enhancer, if it differs from the paper's
-    gan_size: dict = dataclasses.field(default_factory=dict)
-    fits: int = 3
-    rows: tuple[int, ...] = (2_700, 1_000_000, 100_000)  # samples of a fit and of scoring one channel, and of a fit of ten channels
-    labelled_windows: int = 100_000
-
-
-QUICK = Budget(2, 2, 1, 1, 64, 10_000, {"window": 125, "hidden_units": 32}, {"window": 125, "filters": 8}, 1, (1_000, 2_000, 1_000), 100)
+WINDOW_FLOP = 2 * sum(inputs * outputs for inputs, outputs in LAYERS)  # operations of the enhancer for one window
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:
@@ -72,53 +50,53 @@ def compared(
     }
 
 
-def measure(workers: Mapping[str, Worker], repetitions: int) -> dict[str, list[float]]:
+def measure(workers: Mapping[str, Worker]) -> dict[str, list[float]]:
     """Lets the workers repeat their work alternately; those that are skipped have no times."""
     ways = {name: worker.repeat for name, worker in workers.items() if not worker.skipped}
-    found = in_turns(ways, repetitions)
+    found = in_turns(ways, REPETITIONS)
     for worker in workers.values():
         worker.close()
     return found
 
 
-def enhancer(budget: Budget) -> Iterator[dict]:
+def enhancer() -> Iterator[dict]:
     """Benchmarks a training step of the enhancer."""
-    given, work = {"num_steps": budget.steps, **budget.size}, "enhancer step"
+    given, work = {"num_steps": 40}, "enhancer step"
     workers = {
         "ours": Worker("ours", "enhancer_step", **given),
         "plain fit": Worker("keras_plain", "enhancer_step", **given),
         "PyTorch, fused Adam": Worker("torch_enhancer", "enhancer_step", **given),
-        "floor": Worker("ours", "copy", num_bytes=budget.copied_bytes),
+        "floor": Worker("examples", "copy", num_bytes=TRAFFIC),
     }
-    found = measure(workers, budget.repetitions)
+    found = measure(workers)
     for name in ("plain fit", "PyTorch, fused Adam"):
         yield _row(work, workers, found, name, 0.7)
     yield compared(work, found["ours"], "memory-traffic floor", [TRAFFIC * each for each in found["floor"]], target=1.3)
 
 
-def gan(budget: Budget) -> Iterator[dict]:
+def gan() -> Iterator[dict]:
     """Benchmarks an iteration of the paper's GAN, with and without dropout."""
     for work, dropout, targets in (("GAN iteration", 0.0, (0.25, 0.65)), ("GAN iteration, dropout 0.3", 0.3, (0.5, None))):
-        given = {"num_iterations": budget.iterations, "dropout": dropout, **budget.gan_size}
+        given = {"num_iterations": 5, "dropout": dropout}
         workers = {
             "ours": Worker("ours", "gan_iteration", **given),
-            "textbook loop": Worker("textbook_gan", "gan_iteration", **(given | {"num_iterations": budget.textbook_iterations})),
+            "textbook loop": Worker("textbook_gan", "gan_iteration", num_iterations=3, dropout=dropout),
             "one tf.function": Worker("keras_plain", "gan_iteration", **given),
         }
-        found = measure(workers, budget.repetitions)
+        found = measure(workers)
         for name, target in zip(("textbook loop", "one tf.function"), targets, strict=True):
             yield _row(work, workers, found, name, target)
 
 
-def generation(budget: Budget) -> Iterator[dict]:
+def generation() -> Iterator[dict]:
     """Benchmarks the generation of windows, in memory and to Parquet."""
-    given = {"num_windows": budget.windows, **budget.size}
+    given = {"num_windows": 4_096}
     workers = {
         "product": Worker("ours", "matrix_product"),
         "predict": Worker("keras_plain", "enhance_and_noise", **given),
         **{name: Worker("ours", name, **given) for name in ("enhance_and_noise", "generate", "generate_to_parquet")},
     }
-    found = measure(workers, budget.repetitions)
+    found = measure(workers)
     product = [WINDOW_FLOP * each for each in found["product"]]
     window = "generation of a window, enhancer + noise"
     yield compared(window, found["enhance_and_noise"], "matrix-product rate", product, target=1.25)
@@ -128,37 +106,7 @@ def generation(budget: Budget) -> Iterator[dict]:
     yield compared(window, found["generate_to_parquet"], "generation in memory", found["generate"], target=1.67)
 
 
-def tool(budget: Budget) -> Iterator[dict]:
-    """Benchmarks the tool: processor time of whole commands against what they may take, and generation against NumPy."""
-    short, long, joint = budget.rows
-    with tempfile.TemporaryDirectory() as folder:
-        model, long_table = f"{folder}/model", f"{folder}/table.csv"
-        of_tool.table(long_table, long)
-        scored = ("score", model, long_table, "--out", f"{folder}/scores.parquet")
-        pair = Path(__file__).parents[1] / "examples" / "battery"
-        battery = (str(pair / "telemetry.csv"), "--coarse", str(pair / "simulator.csv"), "--window", "100")
-        works = {
-            f"default fit, {short:,} samples": (("fit", "1", str(short), model), 10),
-            f"default fit, ten channels jointly, {joint:,} rows": (("fit", "10", str(joint)), 60),
-            "fit --coarse of the battery": (("command", "fit", *battery, "--out", f"{folder}/battery"), 10),
-            f"score, {long:,} samples in CSV": (("command", *scored), 5),
-            f"score by the residual, {long:,} samples in CSV": (("command", *scored, "--detector", "residual"), 10),
-            f"{budget.labelled_windows:,} labelled windows to Parquet": (("windows", model, str(budget.labelled_windows), folder), 5),
-        }
-        for work, (arguments, bar) in works.items():
-            ours = [of_tool.seconds_of(*arguments) for _ in range(budget.fits)]
-            yield compared(work, ours, f"{bar} s of processor time", [bar] * len(ours), "s", target=1.0)
-    number = 6 * budget.windows
-    workers = {
-        name: Worker("tool", "generation", noise=name, num_windows=number) for name in ("residual windows", "matched residual windows")
-    }
-    workers["NumPy"] = Worker("tool", "product_gather_sum", num_windows=number)
-    found = measure(workers, budget.repetitions)
-    for name, target in (("residual windows", 2.0), ("matched residual windows", 4.0)):
-        yield compared(f"generation of a window, ridge and {name}", found[name], "product, gather and sum", found["NumPy"], target=target)
-
-
-def starting(budget: Budget) -> Iterator[dict]:
+def starting() -> Iterator[dict]:
     """Benchmarks the start of commands that need no network."""
     command = ("-m", "enhsim_tf.reproduce")
     arguments = {
@@ -167,7 +115,7 @@ def starting(budget: Budget) -> Iterator[dict]:
         "import enhsim_tf": ("-c", "import enhsim_tf"),
         "import tensorflow": ("-c", "import tensorflow"),
     }
-    found = in_turns({name: _timed(each) for name, each in arguments.items()}, budget.repetitions)
+    found = in_turns({name: _timed(each) for name, each in arguments.items()}, REPETITIONS)
     theirs = found.pop("import tensorflow")
     for name, ours in found.items():
         yield compared(name, ours, "import tensorflow", theirs, "s")

@@ -7,19 +7,19 @@ discriminator permanently, so the loop would be fast but wrong. Before the timin
 import numpy as np
 import tf_keras as keras
 
-from benchmarks.examples import Work, gan_networks
+from benchmarks.examples import WINDOW, Work, gan_networks
 
 
-def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
+def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
     """Prepares iterations with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
-    generator, discriminator = gan_networks(keras, window, filters, dropout)
+    generator, discriminator = gan_networks(keras, dropout)
     discriminator.compile(loss="binary_crossentropy", optimizer="adam", metrics=["accuracy"])
     discriminator.trainable = False
     combined = keras.Sequential([generator, discriminator])
     combined.compile(loss="binary_crossentropy", optimizer="adam")
 
     rng = np.random.default_rng(0)
-    noise = rng.normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
+    noise = rng.normal(0, 0.1, (1_500, WINDOW, 1)).astype(np.float32)
     ones, zeros = np.ones((200, 1), np.float32), np.zeros((200, 1), np.float32)
 
     def run() -> None:

@@ -3,12 +3,12 @@
 import numpy as np
 import torch
 
-from benchmarks.examples import Work
+from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work
 
 
-def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+def enhancer_step(num_steps: int) -> Work:
     """Prepares training steps of 15 windows in random order."""
-    widths = (window, window, hidden_units, hidden_units, window)
+    widths = (WINDOW, WINDOW, HIDDEN_UNITS, HIDDEN_UNITS, WINDOW)
     stack = []
     for number, (inputs, outputs) in enumerate(zip(widths[:-1], widths[1:], strict=True)):
         stack += [torch.nn.Linear(inputs, outputs)] + ([torch.nn.ReLU()] if number < 3 else [])
@@ -16,7 +16,7 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
     adam = torch.optim.Adam(model.parameters(), lr=0.001, fused=True)
     loss = torch.nn.MSELoss()
     rng = np.random.default_rng(0)
-    source, target = (torch.from_numpy(rng.normal(0, 0.5, (15 * num_steps, window)).astype(np.float32)) for _ in range(2))
+    source, target = (torch.from_numpy(rng.normal(0, 0.5, (15 * num_steps, WINDOW)).astype(np.float32)) for _ in range(2))
 
     def run() -> None:
         order = torch.randperm(len(source))

@@ -3,7 +3,7 @@
 import argparse
 import dataclasses
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,6 +71,16 @@ class Command:
         run(options, make_settings(options.budget, **turned), out)
         tell(f"tables, findings.json and figures in {out}/")
         return 0
+
+
+def environment_option(names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """The option `--environment` of a study with these kinds of noise."""
+    return {"--environment": {"choices": tuple(names), "help": "run with this kind of noise only (default: all)"}}
+
+
+def environments(options: argparse.Namespace, names: Iterable[str]) -> tuple[str, ...]:
+    """The kinds of noise that `--environment` asks for."""
+    return tuple(names) if options.environment is None else (options.environment,)
 
 
 def example_command(study: str, what: str, tables: "Callable[[], Mapping[str, pd.DataFrame]]", arguments: list[str] | None = None) -> int:

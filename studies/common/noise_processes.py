@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-LOOKED_AT = ("white", "autoregressive", "heteroscedastic", "shot", "fractional", "heavy_tails", "one_over_f")
+NOISES = ("white", "autoregressive", "heteroscedastic", "shot")  # of most studies
+LOOKED_AT = (*NOISES, "fractional", "heavy_tails", "one_over_f")
 _HALF = float(np.sqrt(0.005))  # half the variance of noise of standard deviation 0.1
 _SIGNAL_SD = float(np.sqrt(0.5**2 / 2 + 0.25**2 / 2))  # of the two waves of the example telemetry
 Signal = np.ndarray | None

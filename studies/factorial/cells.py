@@ -5,7 +5,7 @@ A cell is one combination of four factors. Its training data are the signal of i
 - `windows`: the enhancer and the generator learn from as many windows as the paper's pipeline (few) or the residual pipeline (many).
 - `extraction`: the generator learns the telemetry minus its moving average, or minus the signal of the cell's enhancer (residual).
 - `enhancer`: the paper's network, or ridge regression whose penalty is chosen by cross-validation over blocks of time.
-- `generator`: the paper's GAN, the convolutional GAN, a fitted autoregression, or whole windows of the extracted noise drawn again.
+- `generator`: the paper's GAN, a fitted autoregression, or whole windows of the extracted noise drawn again.
 
 Two deviations from a full design limit its cost. With many windows, the network is trained as in the residual pipeline (2 epochs, falling
 learning rate), because the paper's 40 epochs would take ten times as long. The detectors are the five that train in a second.
@@ -17,15 +17,15 @@ import itertools
 FEW, MANY = "few", "many"
 MOVING_AVERAGE, RESIDUAL = "moving average", "residual"
 NETWORK, RIDGE = "network", "ridge"
-PAPER_GAN, CONVOLUTIONAL_GAN, AUTOREGRESSION, WHOLE_WINDOWS = "paper's GAN", "convolutional GAN", "autoregression", "whole windows"
+PAPER_GAN, AUTOREGRESSION, WHOLE_WINDOWS = "paper's GAN", "autoregression", "whole windows"
 LEVELS = {
     "windows": (FEW, MANY),
     "extraction": (MOVING_AVERAGE, RESIDUAL),
     "enhancer": (NETWORK, RIDGE),
-    "generator": (PAPER_GAN, CONVOLUTIONAL_GAN, AUTOREGRESSION, WHOLE_WINDOWS),
+    "generator": (PAPER_GAN, AUTOREGRESSION, WHOLE_WINDOWS),
 }
 """Levels of each factor; the first is that of the paper."""
-GENERATORS = (WHOLE_WINDOWS, AUTOREGRESSION, CONVOLUTIONAL_GAN)
+GENERATORS = (WHOLE_WINDOWS, AUTOREGRESSION)
 """Levels of the generator with which the paper's GAN is compared, the main comparison first."""
 REFERENCES = ("coarse", "real")
 """Training data outside the factorial: the two ends of the gap that the cells close."""

@@ -7,13 +7,12 @@ import matplotlib.figure
 import numpy as np
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, new_sheet, panels
-from studies.factorial.cells import AUTOREGRESSION, CONVOLUTIONAL_GAN, LEVELS, WHOLE_WINDOWS
+from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, QUIET, new_sheet, panels
+from studies.factorial.cells import AUTOREGRESSION, LEVELS, WHOLE_WINDOWS
 
 _SHOWN = {  # colour and marker differ, so that the comparisons can be told apart in greyscale
     WHOLE_WINDOWS: (ENHANCED, "o"),
     AUTOREGRESSION: (COARSE, "s"),
-    CONVOLUTIONAL_GAN: (GENERATED, "D"),
 }
 _FACTORS = {
     "windows": "windows: 1,500\nto 15,000",
@@ -42,7 +41,7 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         place = axes.get_position()
         axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
         for line, (generator, (colour, marker)) in enumerate(_SHOWN.items()):
-            at = -np.arange(len(LEVELS)) - _APART * (line - 1)
+            at = -np.arange(len(LEVELS)) - _APART * (line - (len(_SHOWN) - 1) / 2)
             shares = [found["shares"][generator][outcome]["factors"][factor]["share"] for factor in LEVELS]
             mean, low, high = (100 * np.array([share[key] for share in shares]) for key in ("mean", "low", "high"))
             axes.hlines(at, low, high, color=colour, linewidth=2, alpha=0.6)

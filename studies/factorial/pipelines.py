@@ -15,7 +15,6 @@ from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
 from studies.common import evaluation
 from studies.factorial.cells import (
     AUTOREGRESSION,
-    CONVOLUTIONAL_GAN,
     DETECTORS,
     FEW,
     MANY,
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from studies.common.paper_gan import PaperGAN
-    from studies.noise_models.networks.convolutional_gan import ConvolutionalGAN
 
 Enhance = Callable[[np.ndarray], np.ndarray]
 TRAINING, THRESHOLD = "arms, training", "arms, threshold"
@@ -168,7 +166,7 @@ class Pipelines:
         coarse, target = self.pairs(starts)
         return target - self.enhancer(enhancer, windows)(coarse)
 
-    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | PaperGAN | ConvolutionalGAN":
+    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | PaperGAN":
         """The fitted noise model of a cell. The last one is kept, because both purposes and some cells share it."""
         key = (*cell.source, cell.generator)
         if self._model is None or self._model[0] != key:
@@ -176,18 +174,12 @@ class Pipelines:
                 WHOLE_WINDOWS: WindowBootstrap,
                 AUTOREGRESSION: self._autoregression,
                 PAPER_GAN: self._paper_gan,
-                CONVOLUTIONAL_GAN: self._convolutional_gan,
             }[cell.generator]
             self._model = (key, fit(self.extracted(*cell.source)))
         return self._model[1]
 
     def _autoregression(self, noise: np.ndarray) -> GaussianAutoregression:
         return GaussianAutoregression.fit(noise, min(self.settings.factorial.max_order, self.window - 1))
-
-    def _convolutional_gan(self, noise: np.ndarray) -> "ConvolutionalGAN":
-        from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
-
-        return fit_convolutional_gan(noise, self.settings.paper.iterations, self.seed)
 
     def _paper_gan(self, noise: np.ndarray) -> "PaperGAN":
         from studies.common.paper_gan import PaperGAN

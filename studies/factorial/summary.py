@@ -5,7 +5,7 @@ Fixed before the first run:
 - The primary outcome is the share of the gap in false alarms that a cell closes: (coarse - cell) / (coarse - real), each the mean
   false-alarm rate over the detectors. The second outcome is recall at the real rate.
 - Each factor is switched from the paper's level to the other one: few to many windows, moving average to residual, network to ridge
-  regression, and the paper's GAN to each of the three other generators in turn. Whole windows are the main comparison.
+  regression, and the paper's GAN to each of the other generators in turn. Whole windows are the main comparison.
 - The contribution of a factor is the change that switching it makes, averaged over all orders in which the four factors can be switched
   (the Shapley value). The contributions add up to the difference between the two ends. Because factors interact, the change is also given
   for a factor that is switched first (from the paper's pipeline) and last.
@@ -16,13 +16,12 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from studies.common.environments import NOISES
+from studies.common.noise_processes import NOISES
 from studies.common.statistics import mean_interval, t_interval
 from studies.common.tables import KeptTables
 from studies.factorial.cells import (
     AUTOREGRESSION,
     CELLS,
-    CONVOLUTIONAL_GAN,
     DETECTORS,
     FEW,
     GENERATORS,
@@ -48,7 +47,6 @@ CONTRASTS = {
     "no network, paper": (WITHOUT_NETWORK.name, PAPER_CELL.name),
     "network, ridge": (Cell(MANY, RESIDUAL, NETWORK, WHOLE_WINDOWS).name, WITHOUT_NETWORK.name),
     "autoregression, whole windows": (Cell(MANY, RESIDUAL, RIDGE, AUTOREGRESSION).name, WITHOUT_NETWORK.name),
-    "convolutional GAN, whole windows": (Cell(MANY, RESIDUAL, RIDGE, CONVOLUTIONAL_GAN).name, WITHOUT_NETWORK.name),
     "few, many": (Cell(FEW, RESIDUAL, RIDGE, WHOLE_WINDOWS).name, WITHOUT_NETWORK.name),
 }
 """Differences in false alarms and recall that the conclusions use: the first cell minus the second."""

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from studies.common.command import Command
-from studies.common.environments import NOISES, environment_option, environments
+from studies.common.command import Command, environment_option, environments
+from studies.common.noise_processes import NOISES
 
 
 def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common import measures as fidelity
 from enhsim_tf.common import two_sample
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.window_features import window_features
 from enhsim_tf.simulator.noise_choice import DECIMALS
 from studies.noise_models import distances
@@ -107,15 +106,12 @@ class RealFloor:
         num_resplits: Number of resamples. Each measure uses at most its `max_resplits`.
         seed: Seed for the resampling.
         measures: The measures.
-
-    Raises:
-        InputError: If there are fewer than 20 windows on either side, or if a value is not finite.
     """
 
     def __init__(self, real: np.ndarray, later_real: np.ndarray, num_resplits: int, seed: int = 0, measures: Sequence[Measure] = MEASURES):
-        self.measures, self.num_windows, self.samples = tuple(measures), min(len(real), len(later_real)), np.shape(real)[1]
+        self.measures, self.num_windows = tuple(measures), min(len(real), len(later_real))
         self._offset, self._unit = np.mean(real, dtype=np.float64), np.std(real, dtype=np.float64)
-        real, later_real = self._checked(real, "real"), self._checked(later_real, "second real")
+        real, later_real = self._standardised(real), self._standardised(later_real)
         describe = functools.cache(lambda function: (function(real), function(later_real)))
         self._real = {measure.describe: describe(measure.describe)[0] for measure in self.measures}
         splits = list(self._resplits(num_resplits, np.random.default_rng(seed)))
@@ -136,11 +132,8 @@ class RealFloor:
 
         Returns:
             A row for each measure.
-
-        Raises:
-            InputError: If there are too few windows, if they have another length, or if a value is not finite.
         """
-        generated = self._checked(generated, "generated")
+        generated = self._standardised(generated)
         describe = functools.cache(lambda function: function(generated))
         rows = []
         for measure in self.measures:
@@ -149,13 +142,8 @@ class RealFloor:
             rows.append(Row(measure.name, value, measure.departure(value) / max(self.departures[measure.name], 1e-12)))
         return rows
 
-    def _checked(self, windows: np.ndarray, kind: str) -> np.ndarray:
-        """Checks windows and returns the first `num_windows` of them, standardised by the real windows and rounded."""
-        if np.ndim(windows) != 2 or len(windows) < max(20, self.num_windows) or np.shape(windows)[1] != self.samples:
-            least = f"at least {max(20, self.num_windows)} {kind} windows of {self.samples} samples"
-            raise InputError(f"Expected {least}. Received: shape {np.shape(windows)}.")
-        if not (np.isfinite(windows).all() and self._unit > 0):
-            raise InputError(f"Expected finite values that vary. Received: {kind} windows with a NaN or infinity, or all the same value.")
+    def _standardised(self, windows: np.ndarray) -> np.ndarray:
+        """The first `num_windows` windows, standardised by the real windows and rounded."""
         standardised = (np.asarray(windows[: self.num_windows], np.float64) - self._offset) / self._unit
         return np.round(standardised, DECIMALS).astype(np.float32)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from enhsim_tf.detection.registry import DETECTORS
 from studies.common.controls import CONTROLS
-from studies.common.environments import NOISES
+from studies.common.noise_processes import NOISES
 from studies.common.statistics import mean_interval
 from studies.common.tables import KeptTables
 from studies.robustness.degraded_modes import LARGEST_TRAINED, METHODS

@@ -5,7 +5,6 @@ times, so samples are counted. Anomalous sequences include their last sample in 
 """
 
 import ast
-import csv
 import dataclasses
 import os
 from pathlib import Path
@@ -13,12 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import load_npy
 from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.sources import read_source
 
 LABELS = "labeled_anomalies.csv"
-_COLUMNS = ("chan_id", "anomaly_sequences")
-
 Ranges = tuple[tuple[int, int], ...]
 
 
@@ -57,46 +54,38 @@ def read_labels(folder: str | os.PathLike) -> dict[str, Ranges]:
         Anomalous samples by channel, in the order of the file.
 
     Raises:
-        InputError: If the file is missing or a row cannot be read. The message names the row.
+        InputError: If the file is missing or a row cannot be read. The message names the row's channel.
     """
-    path = Path(folder) / LABELS
+    import pandas as pd
+
+    path, columns = Path(folder) / LABELS, ["chan_id", "anomaly_sequences"]
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or error
+        rows = pd.read_csv(path, usecols=columns, dtype=str, keep_default_na=False, encoding="utf-8-sig")
+    except (OSError, ValueError) as error:  # pandas raises kinds of ValueError
         raise InputError(
-            f"Expected a folder with train/, test/ and {LABELS}. Received: {folder} ({reason}). Name the data set's folder."
+            f"Expected a folder with train/, test/ and {LABELS}, which has the columns {' and '.join(columns)}. "
+            f"Received: {str(error).splitlines()[0]} in {folder}. Name the data set's folder."
         ) from None
-    header = [name.strip() for name in header]
-    if not set(_COLUMNS) <= set(header):
-        raise InputError(
-            f"Expected the columns {', '.join(_COLUMNS)}. Received: {', '.join(header[:8]) or 'none'} in {path}. Add a header."
-        )
-    found: dict[str, list[tuple[int, int]]] = {}
-    for number, cells in enumerate(rows, 2):
-        if any(cell.strip() for cell in cells):
-            where = f"line {number} of {path.name}"
-            if len(cells) != len(header):
-                raise InputError(f"Expected {len(header)} columns. Received: {len(cells)} in {where}. Correct the line.")
-            row = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
-            channel = row["chan_id"]
-            if not channel or channel in (".", "..") or {"/", "\\"} & set(channel):
-                raise InputError(f"Expected a channel's name. Received: {channel!r} in {where}. Correct the line.")
-            found.setdefault(channel, []).extend(_sequences(row["anomaly_sequences"], where))
-    if not found:
+    if rows.empty:
         raise InputError(f"Expected labelled channels. Received: none in {path}. Add a line for each.")
+    found: dict[str, list[tuple[int, int]]] = {}
+    for channel, text in rows[columns].itertuples(index=False):
+        if Path(channel).name != channel:
+            raise InputError(f"Expected a channel's name. Received: {channel!r} in {path}. Correct the line.")
+        found.setdefault(channel, []).extend(_sequences(text, channel))
     return {channel: _joined(sequences) for channel, sequences in found.items()}
 
 
-def _sequences(text: str, where: str) -> list[tuple[int, int]]:
+def _sequences(text: str, channel: str) -> list[tuple[int, int]]:
     try:
         ranges = [(start, end + 1) for start, end in ast.literal_eval(text)]
         is_good = all(type(bound) is int for pair in ranges for bound in pair) and all(0 <= start < stop for start, stop in ranges)
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
         is_good = False
     if not is_good:
-        raise InputError(f"Expected sequences as [[first, last], ...] of samples. Received: {text[:60]!r} in {where}. Correct the line.")
+        raise InputError(
+            f"Expected sequences as [[first, last], ...] of samples. Received: {text[:60]!r} of {channel} in {LABELS}. Correct the line."
+        )
     return ranges
 
 
@@ -124,7 +113,7 @@ def load_channel(folder: str | os.PathLike, channel: str) -> LabelledChannel:
     labels = read_labels(folder)
     if channel not in labels:
         raise InputError(f"Expected a labelled channel, one of: {', '.join(list(labels)[:8])}. Received: {channel!r}. Name one of these.")
-    train, test = (_read(Path(folder) / part / f"{channel}.npy") for part in ("train", "test"))
+    train, test = (_read(Path(folder) / part, channel) for part in ("train", "test"))
     for start, _ in labels[channel]:
         if start >= len(test):
             raise InputError(
@@ -132,22 +121,12 @@ def load_channel(folder: str | os.PathLike, channel: str) -> LabelledChannel:
                 "Correct the line, or give the whole array."
             )
     sequences = tuple((start, min(stop, len(test))) for start, stop in labels[channel])
-    return LabelledChannel(channel, Telemetry(train, name=channel), Telemetry(test, name=channel), sequences)
+    return LabelledChannel(channel, train, test, sequences)
 
 
-def _read(path: Path) -> np.ndarray:
-    where = f"{path.parent.name}/{path.name}"
-    try:
-        array = load_npy(path)
-    except ValueError as error:
-        raise InputError(f"Expected the array {where}. Received: {error} in {path.parents[1]}. Complete the data set.") from None
-    if array.ndim not in (1, 2) or array.dtype.kind not in "fiu" or 0 in array.shape:
-        raise InputError(
-            f"Expected numbers of shape (samples, 1 + commands). Received: {array.dtype} of shape {array.shape} in {where}. Save it again."
-        )
-    column = array if array.ndim == 1 else array[:, 0]
-    values = column.astype(np.float32)
+def _read(folder: Path, channel: str) -> Telemetry:
+    path = folder / f"{channel}.npy"
+    values = next(iter(read_source(path).values())).to_numpy(np.float32)
     if not np.isfinite(values).all():
-        bad = int(np.argmax(~np.isfinite(values)))
-        raise InputError(f"Expected finite values. Received: {column[bad]} at sample {bad} of {where}. Clean it and save it again.")
-    return values
+        raise InputError(f"Expected finite values. Received: NaN or infinity in {path}. Clean it and save it again.")
+    return Telemetry(values, name=channel)

@@ -2,7 +2,9 @@
 
 import importlib
 import json
+import re
 
+import pandas as pd
 import pytest
 
 from studies.common.command import PUBLISHED
@@ -15,6 +17,13 @@ def findings(study):
     return json.loads((PUBLISHED / study / "results" / "findings.json").read_text(encoding="utf-8"))
 
 
+def numbers_of(study):
+    """The numbers of the tables in a study's README, by the first cell of a row."""
+    text = (PUBLISHED / study / "README.md").read_text(encoding="utf-8")
+    rows = (line.strip("| ").split(" | ", 1) for line in text.splitlines() if line.startswith("| "))
+    return {name: [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", cells)] for name, cells in rows}
+
+
 def shared(kept, again):
     """The part of what is kept that is computed again: code of some findings has left, and the study's page names the last commit with it."""
     return {key: shared(kept[key], each) for key, each in again.items()} if isinstance(again, dict) else kept
@@ -25,6 +34,29 @@ def test_the_published_findings_are_those_of_the_published_tables(study, near):
     summary, kept = importlib.import_module(f"studies.{study}.summary"), findings(study)
     again = json.loads(json.dumps(summary.summarise(summary.KEPT.read(PUBLISHED / study / "results"))))
     assert again == near(shared(kept, again)) and kept["budget"] == "full"
+
+
+def test_the_main_findings_on_references_and_sources_are_those_of_the_published_table(near):
+    summary = importlib.import_module("studies.reference_or_source.summary")
+    table = summary.KEPT.read(PUBLISHED / "reference_or_source" / "results")["alarms"]
+    found = summary.summarise({"alarms": table[(table["axis"] == "main") & (table["simulator"] == "wrong physics")]})
+    for system, about in found["systems"].items():
+        kept = findings("reference_or_source")["systems"][system]
+        points = {(each["axis"], each["simulator"], each["units"]): each for each in kept["points"]}
+        kept["points"] = [points[each["axis"], each["simulator"], each["units"]] for each in about["points"]]
+        assert kept == near(about)
+
+
+@pytest.mark.parametrize("regime", ["gentle", "hard"])
+def test_the_errors_and_times_of_the_battery_that_are_no_longer_computed_are_those_of_its_tables(regime):
+    folder, found = PUBLISHED / "battery" / "results", findings("battery")["regimes"][regime]
+    errors, speed = (pd.read_parquet(folder / f"{name}.parquet", filters=[("regime", "==", regime)]) for name in ("errors", "speed"))
+    for is_nominal, rows in errors.groupby(errors["fault"] == "nominal"):
+        for enhancer, values in rows.groupby("enhancer", observed=True)["nrmse"]:
+            kept = found["nominal"][enhancer]["mean"] if is_nominal else found["on_faults"][enhancer]
+            assert float(values.astype(float).mean()) == pytest.approx(kept, rel=1e-4)  # tables hold float32
+    seconds = speed.groupby("what", observed=True)["seconds"].mean().astype(float)
+    assert seconds.to_dict() == pytest.approx(found["seconds"], rel=1e-4)
 
 
 @pytest.mark.parametrize("study", [*STUDIES, "reference_or_source"])
@@ -83,7 +115,7 @@ def of_reference_or_source(found):
         ("spacecraft", of_spacecraft, 11, [0.0051, 0.051, 0.51]),
     ],
 )
-def test_the_tables_of_a_page_have_the_numbers_of_the_findings(study, values, number, within, numbers_of):
+def test_the_tables_of_a_page_have_the_numbers_of_the_findings(study, values, number, within):
     rows = numbers_of(study)
     shown = {name: expected for name, expected in values(findings(study)) if name in rows}
     assert len(shown) == number

@@ -61,22 +61,15 @@ def test_a_cell_without_current_keeps_its_voltage_and_the_temperature_around_it(
         np.testing.assert_allclose(run[:, CELSIUS], celsius, atol=0.01)
 
 
-def test_a_failed_run_is_repeated_with_less_current_and_told(monkeypatch, capsys):
-    tried = []
-
+def test_a_failed_run_is_repeated_with_less_current(monkeypatch):
     def failing(model, current, regime, faults, onset):
-        tried.append((model, float(current[0])))
-        ok = abs(current[0]) < 0.85
-        return [np.full((len(current), 3), current[0]) if ok or fault is None else None for fault in faults]
+        return [np.full((len(current), 3), current[0]) if current[0] < largest or fault is None else None for fault in faults]
 
     monkeypatch.setattr(module, "simulate", failing)
     monkeypatch.setattr(module, "battery_current", lambda load, regime: np.ones(5))
+    largest = 0.85
     nominal, faulty = simulate_all(np.zeros(5), GENTLE, [None, Fault("lost capacity", 1.0)])
     assert [run[0, 0] for run in nominal] == [1, 1] and [run[0, 0] for run in faulty] == pytest.approx([0.81, 0.81])
-    assert [current for _, current in tried] == pytest.approx([1, 1, 0.9, 0.9, 0.81, 0.81])
-    assert [line.split(" of the load")[0] for line in capsys.readouterr().out.splitlines()] == [
-        f"a solver failed; the current is reduced to {share}" for share in ("0.90", "0.81")
-    ]
-    monkeypatch.setattr(module, "simulate", lambda model, current, regime, faults, onset: [None] * len(faults))
+    largest = 0.0
     with pytest.raises(InputError, match="Expected loads that the solver can follow"):
-        simulate_all(np.zeros(5), GENTLE, [None])
+        simulate_all(np.zeros(5), GENTLE, [Fault("lost capacity", 1.0)])

@@ -8,7 +8,7 @@ import pytest
 from enhsim_tf.enhancer.names import RIDGE
 from studies.battery import detectors, record, simulate
 from studies.battery.__main__ import command
-from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, Judge, alarm_rows
+from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, Judge
 from studies.battery.faults import ALL
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, battery_current, draw_load
 from studies.battery.record import pair_windows, run_key
@@ -80,17 +80,6 @@ def test_training_and_threshold_share_no_orbit_and_are_drawn_by_the_seed(recorde
     for name, (training, held_out) in sources.items():
         assert not (training[:, None, :50] == held_out[None, :, :50]).all(axis=2).any()
         np.testing.assert_array_equal(again[name][1], held_out)
-
-
-def test_a_threshold_comes_from_the_training_data():
-    held_out = np.arange(1, 1_001, dtype=float)  # the conformal threshold of 1 % is the 991st of 1,000 scores
-    nominal, faulty = np.full(100, 991.0), np.full(40, 992.0)
-    nominal[[3, 70]] = 2_000
-    about = {"training": "training", "detector": "name"}
-    assert alarm_rows(*about.values(), held_out, {None: nominal, ALL[0]: faulty}) == [
-        {"fault": "nominal", "severity": 0.0, **about, "alarms": 0.02},
-        {"fault": ALL[0].kind, "severity": ALL[0].severity, **about, "alarms": 1.0},
-    ]
 
 
 def test_without_pybamm_the_command_says_what_to_install(monkeypatch, capsys, tmp_path):

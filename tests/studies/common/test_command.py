@@ -1,8 +1,10 @@
-"""The command that all studies share refuses what it cannot do, in one line and before it writes anything."""
+"""The command that all studies share refuses what it cannot do, in one line and before it writes anything; its settings."""
 
 import importlib
 
 import pytest
+
+from studies.common.settings import make_settings
 
 STUDIES = ("robustness", "factorial", "noise_models", "few_windows", "spacecraft", "battery", "reference_or_source")
 
@@ -20,3 +22,11 @@ def test_what_cannot_be_done_is_refused_in_one_line(study, words, capsys, tmp_pa
     lines = said.err.splitlines()
     assert len(lines) == 1 and lines[0].startswith("error: Expected ") and "Received: " in lines[0] and not said.out
     assert not list(tmp_path.iterdir())
+
+
+def test_a_budget_and_changes_reach_their_groups(refused):
+    made = make_settings("smoke", paper__seed=4, robustness__num_seeds=7)
+    assert (made.seed, made.paper.epochs, made.robustness.num_seeds, made.robustness.num_windows) == (4, 2, 7, 200)
+    assert made.of("shot", 9).noise == "shot" and made.of("shot", 9).seed == 9
+    with refused("'noise'"):
+        make_settings(noise="shot")

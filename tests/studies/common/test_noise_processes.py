@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from studies.common import noise_processes as noises
-from studies.common.environments import FAMILIES, NOISES
-from studies.common.noise_processes import GALLERY, LOOKED_AT
+from studies.common.example import draw_noise
+from studies.common.noise_processes import GALLERY
 
 SLOW = {"fractional": 0.03, "one_over_f": 0.03, "telegraph": 0.01}  # mean of a million samples, in the unit of the signal
 # the mean square of t noise with three degrees of freedom has no variance of its own; slow families have few independent samples
@@ -20,22 +20,13 @@ def covariance(series, lag):
     return np.mean(series[: len(series) - lag] * series[lag:])
 
 
-def test_the_halves_are_the_seeds_draw_and_divide_the_gallery():
-    unknown = [
-        "one_over_f", "interference", "telegraph", "quantised", "bursts", "heavy_tails", "loudness", "signal_dependent",
-        "fractional", "bernoulli",
-    ]  # fmt: skip
-    assert set(LOOKED_AT) == {*NOISES, *rng(200812082).permutation(unknown)[:3]}
-    assert set(LOOKED_AT) < set(GALLERY) == set(FAMILIES) == {*NOISES, *unknown}
-
-
 @pytest.mark.parametrize("name", GALLERY)
-def test_families_have_mean_zero_and_the_same_standard_deviation_and_their_owner_draws(name):
+def test_families_have_mean_zero_and_the_standard_deviation_that_is_asked_for_and_their_owner_draws(name):
     signal, process = rng(3).normal(0, noises._SIGNAL_SD, 1_000_000), GALLERY[name]
-    noise = process.draw(1_000_000, rng(), signal)
+    noise = draw_noise(name, signal, 0.1, rng())
     assert noise.shape == (1_000_000,) and noise.dtype == np.float64
     assert process.standard_deviation == pytest.approx(0.1, rel=0.02)  # rounding adds 1 % to quantised noise
-    assert np.std(noise) == pytest.approx(process.standard_deviation, rel=WIDE.get(name, 0.02))
+    assert np.std(noise) == pytest.approx(0.1, rel=WIDE.get(name, 0.02))
     assert np.mean(noise) == pytest.approx(0, abs=SLOW.get(name, 0.002))
     owner, signal = rng(7), signal[:300]
     first = process.draw(300, owner, signal)

@@ -50,7 +50,6 @@ def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable
     assert np.array_equal(Pipelines(one.replicate).arm(cell, TRAINING), first)
 
 
-@pytest.mark.slow
 def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_path, monkeypatch):
     def judged(self, cell):
         alarms = {"coarse": 50, "real": 1}.get(cell, 9)
@@ -60,7 +59,7 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
     options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
     found = run(options, make_settings("smoke", **SMALL), tmp_path)
     table = KEPT.read(tmp_path)["cells"]
-    assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 34 * len(DETECTORS)
+    assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 26 * len(DETECTORS)
     assert not table.duplicated(["environment", "cell", "detector"]).any()
     assert found["cells"]["coarse"]["false_alarms"]["mean"] == pytest.approx(50 / 59)
     assert json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == found
@@ -68,7 +67,7 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("narrow_networks")
+@pytest.mark.usefixtures("narrow_enhancer")
 def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_coarse_reference(tmp_path):
     settings = make_settings("smoke", paper__hidden_units=64, **SMALL).of("shot", 0)
     one = Pipelines(Replicate(settings, Stages(tmp_path)))

@@ -51,17 +51,6 @@ def test_the_stages_that_claims_depend_on_exist():
     assert touches("he_uniform in every layer", "C1") and not touches("no dropout", "C4")
 
 
-def test_what_is_published_are_verdicts_and_ranges_of_the_reference(monkeypatch):
-    from studies.readings import summary
-
-    monkeypatch.setattr(summary, "CLAIMS", summary.CLAIMS[:1])
-    table = table_of(lambda run: run == Run("reference", "oneDNN", 0) or run.reading == "no dropout")
-    found = publish(table)
-    assert found["title"] == "[Re]"
-    assert found["claims"]["C1"]["ranges"]["nrmse"] == [0.1, BAD]
-    assert found["claims"]["C1"]["ranges"]["ridge_nrmse"] == [0.03, 0.03]
-
-
 def test_a_finished_run_is_kept_and_not_done_again(tmp_path, monkeypatch):
     done = []
 

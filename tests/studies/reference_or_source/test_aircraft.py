@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.sources import read_source
 from studies.common.command import example_command
 from studies.reference_or_source import aircraft_flight, aircraft_point_mass, example
 from studies.reference_or_source.aircraft import Aircraft
@@ -156,23 +155,9 @@ def test_errors_are_one_line(monkeypatch, jsbsim, level):
         aircraft_flight.import_jsbsim()
 
 
-def test_the_recorded_pair_is_small_and_its_fault_parts_the_engines():
-    tables = {name: pd.read_csv(FOLDER / f"{name}.csv") for name in ("telemetry", "simulator", "telemetry_fault", "simulator_planned")}
-    assert sum((FOLDER / f"{name}.csv").stat().st_size for name in tables) < 1_000_000
-    assert tuple(read_source(FOLDER / "telemetry.csv")) == AIRCRAFT.channels
-    for recorded, run, flights in (("telemetry", "simulator", example.NUM_FLIGHTS), ("telemetry_fault", "simulator_planned", 1)):
-        telemetry, simulator = tables[recorded], tables[run]
-        assert len(telemetry) == flights * UNIT_SAMPLES and not telemetry.isna().any().any()
-        assert telemetry["time"].equals(simulator["time"]) and simulator["N1 left"].equals(simulator["N1 right"])
-    difference = tables["telemetry_fault"]["N1 right"] - tables["telemetry_fault"]["N1 left"]
-    throttle = (tables["telemetry_fault"]["N1 right"] - 30)[LATE].mean()
-    assert abs(difference[:ONSET].mean()) < 0.05
-    assert difference[LATE].mean() == pytest.approx(example.FAULT.size * throttle, rel=0.05)
-
-
 def test_the_example_is_written_again_as_it_is(jsbsim, tmp_path):
     assert example_command("reference_or_source", "aircraft", functools.partial(example.tables, num_flights=1), [str(tmp_path)]) == 0
-    for name in ("simulator", "telemetry_fault", "simulator_planned"):
+    for name in ("simulator", "telemetry_fault", "simulator_planned"):  # draws of the telemetry depend on the number of flights
         table, shipped = pd.read_csv(tmp_path / f"{name}.csv"), pd.read_csv(FOLDER / f"{name}.csv")[:UNIT_SAMPLES]
         assert list(table) == list(shipped)
         assert np.mean(table.to_numpy() == shipped.to_numpy()) > 0.99  # another processor may round a few values to the next step

@@ -17,12 +17,3 @@ def test_every_block_is_found_in_the_source(samples, block):
     if block == 10:
         firsts = [np.flatnonzero(np.diff(row) != 1)[0] + 1 for row in noise]
         assert len(set(firsts)) == 10  # seams fall anywhere
-
-
-def test_bootstrap_keeps_the_marginal():
-    source = default_rng(0).standard_t(3, (300, 200))
-    noise = BlockBootstrap(source, 50).generate(2_000, default_rng(2))
-    assert np.isin(noise, source.astype(np.float32)).all()
-    shares = [0.25, 0.5, 0.75, 0.95]
-    expected = np.quantile(source[:, 50:-50], shares)  # where each sample is in as many blocks as any other
-    assert np.quantile(noise, shares) == pytest.approx(expected, abs=0.03)

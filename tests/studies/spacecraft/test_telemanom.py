@@ -1,13 +1,10 @@
-"""Labelled data: a small data set with every oddity of the published file, and the published one if it is there."""
-
-from pathlib import Path
+"""Labelled data: a small data set with every oddity of the published file."""
 
 import numpy as np
 import pytest
 
 from studies.spacecraft.telemanom import LABELS, load_channel, read_labels
 
-SMAP = Path(__file__).parents[2] / ".." / "shared" / "data" / "smap"
 HEADER = "chan_id,spacecraft,anomaly_sequences,class,num_values"
 ROWS = [
     'A-1,SMAP,"[[10, 19]]",[point],100',
@@ -57,58 +54,31 @@ def test_channels_by_hand(make):
 @pytest.mark.parametrize(
     ("row", "words"),
     [
-        ("A-1,SMAP,often,[point],100", "'often' in line 3"),
+        ("A-1,SMAP,often,[point],100", "'often' of A-1"),
         ('A-1,SMAP,"[[9, 3]]",[point],100', "[[9, 3]]"),
         ('A-1,SMAP,"[[1.5, 3]]",[point],100', "1.5"),
-        ('A-1,SMAP,"[[1, 2]]",[point]', "Received: 4 in line 3"),
-        (',SMAP,"[[1, 2]]",[point],100', "''"),
         ('../A-1,SMAP,"[[1, 2]]",[point],100', "'../A-1'"),
     ],
 )
 def test_a_bad_row_is_named(make, refused, row, words):
-    folder = make([ROWS[1], row])
-    with refused(words, "line 3"):
-        read_labels(folder)
+    with refused(words, LABELS):
+        read_labels(make([ROWS[1], row]))
 
 
 def test_a_bad_folder_is_refused(make, tmp_path, refused):
-    with refused("train/, test/"):
+    with refused("train/, test/", "No such file"):
         read_labels(tmp_path / "nowhere")
     with refused("chan_id"):
         read_labels(make(header="channel,spacecraft,anomaly_sequences,class,num_values"))
-    for content, words in ((b"", "Received: none"), (HEADER.encode(), "labelled channels")):
-        (tmp_path / LABELS).write_bytes(content)
-        with refused(words):
-            read_labels(tmp_path)
+    with refused("labelled channels"):
+        read_labels(make([]))
     with refused("'Z-9'"):
         load_channel(make(), "Z-9")
     with refused("60 samples", "sample 70 of B-2"):
         load_channel(make(num_test=60), "B-2")
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (np.full((100, 4), np.nan), "sample 0"),
-        (np.where(np.arange(400).reshape(100, 4) == 48, np.inf, 0), "inf at sample 12"),
-        (np.zeros((100, 4, 2)), "(100, 4, 2)"),
-        (np.array(3.0), "shape ()"),
-        (b"no array", ""),
-        (None, "No such file"),
-    ],
-)
-def test_a_bad_array_is_refused(make, refused, content, words):
-    path = make() / "test" / "B-2.npy"
-    path.unlink()
-    if isinstance(content, bytes):
-        path.write_bytes(content)
-    elif content is not None:
-        np.save(path, content)
-    with refused(words, "test/B-2.npy"):
-        load_channel(path.parents[1], "B-2")
-
-
-@pytest.mark.skipif(not (SMAP / LABELS).is_file(), reason="needs ../shared/data/smap beside the repository")
-def test_the_published_channels():
-    lengths = {name: int(load_channel(SMAP, name).is_anomalous.sum()) for name in read_labels(SMAP)}
-    assert lengths.items() >= {"P-3": 1_336, "A-2": 111, "A-3": 186, "G-1": 121, "T-1": 1_536, "T-3": 184}.items()  # as published
+    np.save(tmp_path / "test" / "B-2.npy", np.where(np.arange(400).reshape(100, 4) == 48, np.inf, 0))
+    with refused("finite", "B-2.npy"):
+        load_channel(tmp_path, "B-2")
+    (tmp_path / "test" / "B-2.npy").unlink()
+    with refused("B-2.npy"):
+        load_channel(tmp_path, "B-2")
