@@ -19,7 +19,6 @@ _PLACES = {
     "FunctionSimulator": "coarse_simulator.interface",
     "InjectOptions": "datasets.inject_options",
     "InputError": "common.errors",
-    "ParquetStore": "telemetry.parquet_store",
     "Recording": "coarse_simulator.recording",
     "ScoreOptions": "simulator.options",
     "Scorer": "simulator.scoring",

@@ -1,4 +1,4 @@
-"""A telemetry store in InfluxDB 2, the kind of database at the end of the paper's pipeline. It has the methods of `ParquetStore`.
+"""A telemetry store in InfluxDB 2, the kind of database at the end of the paper's pipeline.
 
 Each series is written under a version tag, the hash of its content. A description that is written last makes this version the
 current one. An interrupted write therefore never leaves a partial series, a repeated write stores the series once, and the old

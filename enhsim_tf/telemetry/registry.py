@@ -12,8 +12,5 @@ FILES = dict.fromkeys(
 FILES[".npy"] = "enhsim_tf.telemetry.arrays:read_array_channels"
 """Maps the ending of a file's name to the path `module:function` of its reader."""
 
-SOURCES = (
-    f"a {', '.join(FILES)} file, several files of tables, a folder of them, the folder of a store, folder#channel, or "
-    "influxdb://bucket/measurement/field?tag=value"
-)
+SOURCES = f"a {', '.join(FILES)} file, several files of tables, a folder of them, or influxdb://bucket/measurement/field?tag=value"
 """All sources as text, for help and messages."""

@@ -1,4 +1,4 @@
-"""Reads telemetry from tables, arrays, the folder of a store, or InfluxDB, as one raw pandas Series per channel.
+"""Reads telemetry from tables, arrays, or InfluxDB, as one raw pandas Series per channel.
 
 Values are returned as they are in the source, and times are parsed but neither sorted nor dropped; that is done by `cleaning`.
 Findings made while reading are stored in `series.attrs["findings"]` and become part of the cleaning report.
@@ -17,10 +17,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.influx_store import InfluxStore
 from enhsim_tf.telemetry.pandas_series import from_series, to_series
-from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.reading.channels import read_table_channels
 from enhsim_tf.telemetry.reading.clock import NO_TIME
-from enhsim_tf.telemetry.reading.files import files_of
 from enhsim_tf.telemetry.registry import FILES, SOURCES
 from enhsim_tf.telemetry.series import Telemetry, check_values
 
@@ -34,8 +32,7 @@ def read_source(
 
     Args:
         source: A table (`.csv`, `.tsv`, `.txt`, `.parquet`, `.xlsx`, also inside `.gz` or `.zip`), several tables with the same columns, a
-            folder of tables, a `.npy` file, the folder of a `ParquetStore`, `folder#channel`,
-            `influxdb://bucket/measurement/field?tag=value`, or a pandas DataFrame or Series.
+            folder of tables, a `.npy` file, `influxdb://bucket/measurement/field?tag=value`, or a pandas DataFrame or Series.
         columns: Names of the channels: columns of a table, column numbers of an array, or series of a store. None: all
             channels that hold numbers.
         time: Name of a table's time column. None: the column is detected, if there is one. `NO_TIME` ("none"): the samples
@@ -66,16 +63,11 @@ def read_source(
     source = os.fspath(source)
     if source.startswith("influxdb://"):
         return _read_influx(source, columns, time)
-    path, channel = Path(source), None
-    if not _exists(path) and "#" in source:
-        folder, channel = source.rsplit("#", 1)
-        path = Path(folder)
+    path = Path(source)
     if not _exists(path):
         raise InputError(f"Expected a source of telemetry. Received: {source}, which does not exist. Give {SOURCES}.")
     if path.is_dir():
-        return _read_folder(path, columns if channel is None else [channel], time, options)
-    if channel is not None:
-        raise InputError(f"Expected folder#channel with a store's folder only. Received: {source}. Name the column of a file instead.")
+        return read_table_channels(path, columns, time, options)
     if path.suffix.lower() not in FILES:
         raise InputError(f"Expected a source of telemetry. Received: {path.name}. Give {SOURCES}.")
     module, reader = FILES[path.suffix.lower()].split(":")
@@ -102,19 +94,6 @@ def _read_influx(source: str, columns: list[str] | None, time: str | None) -> di
     times, values = (np.concatenate(blocks) for blocks in zip(*store.chunks(), strict=True))
     field = store.location.field
     return {field: pd.Series(values, index=pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time"), name=field)}
-
-
-def _read_folder(folder: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
-    """Reads the tables in a folder, or the series of a `ParquetStore`."""
-    if files_of(folder):  # a store has only folders inside
-        return read_table_channels(folder, columns, time, options)
-    if time is not None:
-        raise InputError(f"Expected time with a table only. Received: time={time!r} with the store {folder}. Leave it out.")
-    store = ParquetStore(folder)
-    names = store.names() if columns is None else columns
-    if not names:
-        raise InputError(f"Expected a store with at least one series. Received: the folder {folder} without any. Give {SOURCES}.")
-    return {name: to_series(store.read(name)) for name in names}
 
 
 def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str | None = None, min_samples: int = 2) -> Telemetry:

@@ -1,6 +1,5 @@
-"""Tables, arrays and stores of any content are read, or refused in one line."""
+"""Tables and arrays of any content are read, or refused in one line."""
 
-import contextlib
 import io
 import json
 
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.sources import read_source, read_telemetry
-from tests.fuzzing.readers import all_of, changed, changed_json, judge, tried
+from tests.fuzzing.readers import all_of, changed, judge, tried
 
 NUM = 60
 WAVE = np.round(np.sin(np.arange(NUM) / 5), 3)
@@ -109,40 +108,6 @@ def test_what_once_failed_is_refused(name, data):
 @given(st.data())
 def test_changed_files(name, data):
     judge(read_file, name, data.draw(changed(FILES[name]) | st.binary(max_size=300)))
-
-
-def read_store(data, folder):
-    (folder / "store" / "volts").mkdir(parents=True)
-    (folder / "store" / "volts" / "2024-01-01.parquet").write_bytes(data)
-    use(folder / "store")
-
-
-ABOUT = {"name": "volts", "unit": "V", "start": "2024-01-01T00:00:00+00:00", "interval_s": "60.0", "offset_s": "0.0"}
-
-
-def stored(about):
-    times = pa.array(1_704_067_200 * 10**9 + np.arange(NUM) * 60 * 10**9, pa.timestamp("ns", "UTC"))
-    return parquet_of(pa.table({"time": times, "value": pa.array(WAVE, pa.float32())}).replace_schema_metadata(about))
-
-
-@tried(60)
-@given(changed([stored(ABOUT)]))
-def test_series_of_a_store(data):
-    judge(read_store, data)
-
-
-@tried(60)
-@given(changed_json([json.dumps(ABOUT)]))
-def test_descriptions_of_series_of_a_store(data):
-    content = json.loads(data)
-    with contextlib.suppress(UnicodeEncodeError, ValueError):  # half a character, or a number that Python does not print
-        data = stored({str(key): str(value) for key, value in content.items()} if isinstance(content, dict) else ABOUT)
-    judge(read_store, data)
-
-
-def test_a_series_of_a_store_as_it_was_written_is_accepted():
-    assert judge(read_store, stored(ABOUT))
-    assert not judge(read_store, stored(ABOUT | {"start": "1_000"})) and not judge(read_store, stored(ABOUT | {"interval_s": "nan"}))
 
 
 def test_a_time_too_far_off_for_its_zone_is_refused(tmp_path, refused):

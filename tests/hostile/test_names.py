@@ -15,8 +15,6 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.common.atomic_files import encode_name
 from enhsim_tf.simulator.model_folder import folder_of, models_of
 from enhsim_tf.telemetry.cleaning.clean import clean
-from enhsim_tf.telemetry.parquet_store import ParquetStore
-from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 from tests.hostile.folders import settings_for, write_model
 
@@ -38,12 +36,9 @@ def check_file_name(name):
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_name_that_cannot_be_a_file_name_is_refused(name, refused, tmp_path):
-    for use in (encode_name, lambda name: folder_of(tmp_path, name), ParquetStore(tmp_path).read):
+    for use in (encode_name, lambda name: folder_of(tmp_path, name)):
         with refused("name"):
             use(name)
-    with refused("name"):
-        ParquetStore(tmp_path).write(Telemetry(np.zeros(3, np.float32), name=name))
-    assert not list(tmp_path.iterdir())
 
 
 @settings(derandomize=True, max_examples=100, deadline=None, database=None)
@@ -53,21 +48,13 @@ def test_any_name_is_encoded_as_a_distinct_file_name(name, other):
     assert name == other or encode_name(name) != encode_name(other)
 
 
-def files_below(folder):
-    return {path for path in folder.rglob("*") if path.is_file()}
-
-
-def test_a_store_keeps_every_name_in_its_folder(tmp_path):
+def test_every_hostile_name_is_encoded():
     for name in NAMES:
         check_file_name(name)
-    store = ParquetStore(tmp_path / "inner" / "store")
-    for number, name in enumerate(NAMES):
-        store.write(Telemetry(np.arange(number, number + 5, dtype=np.float32), name=name))
-    assert store.names() == sorted(NAMES)
-    assert [store.read(name).values[0] for name in NAMES] == list(range(len(NAMES)))
-    assert {path.parent.parent for path in files_below(tmp_path)} == {store.folder}
-    read = read_source(store.folder)
-    assert set(read) == set(NAMES)
+
+
+def files_below(folder):
+    return {path for path in folder.rglob("*") if path.is_file()}
 
 
 def lines_of(capfd):

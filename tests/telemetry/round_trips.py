@@ -1,4 +1,4 @@
-"""Series that every store must restore bit for bit."""
+"""Series that the store must restore bit for bit."""
 
 import numpy as np
 
@@ -25,11 +25,6 @@ def same(first: Telemetry, second: Telemetry) -> bool:
     return found[0] == found[1]
 
 
-def series(number: int = 1_000, seed: int = 0, **about) -> Telemetry:
-    """White noise with the given metadata."""
-    return Telemetry(np.random.default_rng(seed).normal(size=number).astype(np.float32), **about)
-
-
 def wheel(number: int = 1_000, seed: int = 0, **about) -> Telemetry:
-    """White noise named "wheel"."""
-    return series(number, seed, **{"name": "wheel"} | about)
+    """White noise named "wheel", or with other metadata."""
+    return Telemetry(np.random.default_rng(seed).normal(size=number).astype(np.float32), **{"name": "wheel"} | about)

@@ -6,7 +6,6 @@ import pytest
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.pandas_series import from_series, to_series
-from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 
@@ -83,6 +82,7 @@ def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
 BAD = {
     "not there": ("absent.csv", None, {}, "does not exist"),
     "a name no file can have": ("x" * 300 + ".csv", None, {}, "does not exist"),
+    "a folder without tables": (".", None, {}, "without any"),
     "unknown kind": ("a.xlsx", b"x", {}, "a.xlsx"),
     "empty": ("a.csv", b"", {}, "empty"),
     "comments only": ("a.csv", b"# a\n# b\n", {}, "a.csv"),
@@ -94,7 +94,6 @@ BAD = {
     "two time columns": ("a.csv", b"start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n", {}, "start, end"),
     "words only": ("a.csv", b"a,b\nx,y\nz,w\n", {}, "none in a.csv"),
     "no columns named": ("a.csv", b"a,b\n1,2\n", {"columns": []}, "columns=[]"),
-    "a channel of a file": ("a.csv#a", b"a,b\n1,2\n", {}, "a.csv#a"),
     "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
     "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "lists in 'window'"),
     "two levels of names": ("a.parquet", pd.DataFrame([[1.0]], columns=pd.MultiIndex.from_tuples([("a", "x")])), {}, "2 levels"),
@@ -108,7 +107,7 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_bad_sources_are_refused(tmp_path, refused, case):
     name, content, arguments, words = BAD[case]
-    path = tmp_path / name.split("#")[0]
+    path = tmp_path / name
     if isinstance(content, pd.DataFrame):
         content.to_parquet(path)
     elif isinstance(content, np.ndarray):
@@ -116,28 +115,7 @@ def test_bad_sources_are_refused(tmp_path, refused, case):
     elif content is not None:
         path.write_bytes(content)
     with refused(words):
-        read_source(tmp_path / name, **arguments)
-
-
-def test_the_series_of_a_store(tmp_path, refused):
-    store = ParquetStore(tmp_path / "store")
-    timed = Telemetry(VALUES.astype(np.float32), 0.25, 3.0, "2020-03-01T06:00:00+00:00", "volts", "V")
-    counted = Telemetry(VALUES.astype(np.float32), name="wheel/1")
-    store.write(timed)
-    store.write(counted)
-    channels = read_source(tmp_path / "store")
-    assert list(channels) == ["volts", "wheel/1"]
-    assert channels["volts"].index[0] == TIMES[0] + pd.Timedelta("3s") and isinstance(channels["wheel/1"].index, pd.RangeIndex)
-    cleaned = clean(channels["volts"])
-    assert (cleaned.parts[0].unit, cleaned.parts[0].interval_s, len(cleaned.report.findings)) == ("V", 0.25, 1)
-    assert list(read_source(f"{tmp_path}/store#wheel/1")) == ["wheel/1"] == list(read_source(tmp_path / "store", columns=["wheel/1"]))
-    with refused("'amps'"):
-        read_source(f"{tmp_path}/store#amps")
-    with refused("time='utc'"):
-        read_source(tmp_path / "store", time="utc")
-    (tmp_path / "empty").mkdir()
-    with refused("without any"):
-        read_source(tmp_path / "empty")
+        read_source(path, **arguments)
 
 
 def test_influxdb_refuses_a_time_column_and_an_incomplete_location(monkeypatch, refused):

@@ -17,7 +17,7 @@ from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.reading.dialect import find_dialect
 from enhsim_tf.telemetry.reading.text_files import Table, read_text, table_of
-from enhsim_tf.telemetry.registry import PACKED
+from enhsim_tf.telemetry.registry import PACKED, SOURCES
 
 TEXTS = (".csv", ".tsv", ".txt")
 _EXCEL = (".xlsx", ".xlsm")
@@ -40,7 +40,7 @@ def files_of(folder: Path) -> list[Path]:
         found = [path for path in folder.iterdir() if path.is_file() and _suffix_of(path) in endings and not path.name.startswith(".")]
         if found:
             return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)])
-    return []
+    raise InputError(f"Expected a folder with tables. Received: {folder} without any. Give {SOURCES}.")
 
 
 def _suffix_of(path: Path) -> str:
