@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.regular_grid import find_interval
 from enhsim_tf.telemetry.cleaning.report import KINDS, finding_from_dict, lines_of
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
@@ -237,6 +238,47 @@ def test_one_of_several_values_at_the_same_time_is_taken(refused, how, value):
         clean(series, Cleaning(same_time="refuse"))
 
 
+@pytest.mark.parametrize("interval_s", [None, 1.0])
+def test_one_late_row_is_snapped_and_named(interval_s):
+    series = with_times(TIMES + pd.to_timedelta(np.where(np.arange(N) == 70, 0.125, 0.0), unit="s"))
+    found = cleaned_of(series, interval_s=interval_s).report.find("jitter")
+    assert (found.count, found.details["largest_s"], found.places[0]) == (1, 0.125, "row 70, 2020-03-01T00:01:10.125000+00:00")
+
+
+def test_steps_that_differ_are_rows_missing_and_no_other_rate():
+    times = START + pd.to_timedelta(np.cumsum([1] * 200 + [3, 4] * 40), unit="s")
+    assert cleaned_of(with_times(times, VALUES[: len(times)])).report.find("other rates") is None
+
+
+BY_HAND = [[1] * 4 + [5] * 3 + [9] * 3, [1] * 4 + [0.1] * 3 + [0.3] * 3, [1] * 40 + [10] + [1] * 50 + [1.2] + [1] * 49]
+
+
+@pytest.mark.parametrize("steps", BY_HAND, ids=["rows missing", "finer stretches", "a gap and a step of the clock"])
+def test_the_interval_by_hand(steps):
+    assert find_interval(np.round(np.cumsum([0, *steps]) * 1e9).astype(np.int64)) == 1e9
+
+
+MEAN = (9 + VALUES[50]) / 2
+
+
+@pytest.mark.parametrize(
+    ("options", "value"),
+    [({}, MEAN), ({"same_time": "last"}, 9), ({"same_time": "first"}, VALUES[50]), ({"same_time": "last", "interval_s": 1.0}, MEAN)],
+)
+def test_rows_near_the_same_sample_are_merged_as_asked(options, value):
+    series = pd.concat([CLEAN, with_times([TIMES[50] + pd.Timedelta("200ms")], [9.0])]).sort_index()
+    as_one(cleaned_of(series, **options), np.where(np.arange(N) == 50, value, VALUES))
+
+
+def test_whole_seconds_that_would_be_dates_of_2299_are_seconds():
+    cleaned = cleaned_of(with_times(22_990_101 + np.arange(28), VALUES[:28]))
+    assert cleaned.report.find("clock").details["form"] == "seconds since zero"
+
+
+def test_two_rows_are_enough_for_an_interval():
+    as_one(cleaned_of(CLEAN.iloc[:2]), VALUES[:2])
+
+
 def test_a_missing_value_at_a_repeated_time_is_ignored():
     series = pd.concat([CLEAN.iloc[:6], pd.Series([np.nan, 9.0], index=TIMES[[5, 6]]), CLEAN.iloc[7:]])
     for how in ("mean", "first", "last"):
@@ -289,11 +331,12 @@ def test_short_parts_are_left_out_and_counted(refused):
         clean(series, Cleaning(min_part=300))
 
 
-def test_a_jump_of_the_clock_splits_the_series_and_keeps_every_row():
-    times = TIMES + pd.to_timedelta(np.where(np.arange(N) < 150, 0, 0.4), unit="s")
+@pytest.mark.parametrize("jump_s", [0.4, 5.4])
+def test_a_jump_of_the_clock_splits_the_series_and_keeps_every_row(jump_s):
+    times = TIMES + pd.to_timedelta(np.where(np.arange(N) < 150, 0, jump_s), unit="s")
     cleaned = cleaned_of(with_times(times), max_jitter=0.1)
     before, after = cleaned.parts
-    assert before.values.tolist() == VALUES[:150].astype(np.float32).tolist() and after.offset_s == pytest.approx(150.4)
+    assert before.values.tolist() == VALUES[:150].astype(np.float32).tolist() and after.offset_s == pytest.approx(150 + jump_s)
     assert after.values.tolist() == VALUES[150:].astype(np.float32).tolist()
     assert (cleaned.report.find("clock steps").count, cleaned.report.rows_used) == (1, N)
 
