@@ -18,7 +18,7 @@ from enhsim_tf.cli.options import (
 )
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import printable, spoken
-from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
 from enhsim_tf.simulator.model_folder import models_of
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
@@ -29,7 +29,7 @@ from enhsim_tf.telemetry.sources import read_source
 
 def run_score(options: argparse.Namespace) -> int:
     """Scores the channels of the source with their simulators and returns the exit code."""
-    named = {option_name(name): name for name in (RESIDUAL, *all_detectors())}
+    named = {option_name(name): name for name in (RESIDUAL, *DETECTORS)}
     detector = None if options.detector is None else named[options.detector]
     chosen = ScoreOptions(detector, options.num_windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_options(options, 2)

@@ -21,7 +21,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_square
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
-from enhsim_tf.detection.registry import RESIDUAL, all_detectors
+from enhsim_tf.detection.registry import DETECTORS, RESIDUAL
 from enhsim_tf.enhancer.model import run_starts
 from enhsim_tf.simulator.joint import cut, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
@@ -66,7 +66,7 @@ class Scorer:
             training = simulator.draw_noise(simulator.generate_clean(self.options.num_windows, seed=seed), np.random.default_rng([seed, 3]))
         else:
             training = simulator.generate(self.options.num_windows, seed=seed)
-        self.detector = ResidualSize() if self.name == RESIDUAL else all_detectors()[self.name](seed)
+        self.detector = ResidualSize() if self.name == RESIDUAL else DETECTORS[self.name](seed)
         means = training.mean(axis=1, dtype=np.float64)
         width = np.maximum(np.ptp(means, axis=0), simulator.noise_sd)
         self._low, self._high = means.min(axis=0) - width, means.max(axis=0) + width  # levels beyond count as residual

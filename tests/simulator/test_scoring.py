@@ -7,7 +7,7 @@ import pytest
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.registry import DETECTORS, register
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.scoring import Scorer, check_fits, event_rows, events_table, score, write_scores
@@ -119,11 +119,10 @@ class Largest:
 
 
 @pytest.fixture
-def largest():
-    """The name of that detector, which is registered."""
-    register("largest sample", lambda seed: Largest())
-    yield "largest sample"
-    del DETECTORS["largest sample"]
+def largest(monkeypatch):
+    """The name of that detector, which is added to the others."""
+    monkeypatch.setitem(DETECTORS, "largest sample", lambda seed: Largest())
+    return "largest sample"
 
 
 def by_hand(series, window=24):

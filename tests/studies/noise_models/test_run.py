@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from enhsim_tf.detection.registry import DETECTORS
+from studies.common.detectors import DETECTORS
 from studies.common.settings import make_settings
 from studies.noise_models import cells
 from studies.noise_models.__main__ import run

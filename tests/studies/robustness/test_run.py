@@ -6,8 +6,8 @@ import json
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES
-from enhsim_tf.detection.registry import DETECTORS
 from studies.common.controls import CONTROLS
+from studies.common.detectors import DETECTORS
 from studies.common.settings import make_settings
 from studies.robustness import replicate
 from studies.robustness.__main__ import run
