@@ -75,12 +75,3 @@ def test_waves_in_phases_that_training_never_had_are_seen_by_their_distance(fitt
     shifted = COARSE.waves[0](nominal) + COARSE.waves[1](nominal + 30)
     inside, outside = (fitted.score(windows) for windows in (COARSE(nominal), shifted))
     assert outside.min() > inside.max()
-
-
-def test_what_is_refused(fitted, training, refused):
-    with refused("(windows, 500)", "(1500, 499)"):
-        fitted.score(training[:, 1:])
-    with refused("finite"):
-        OutOfRange().fit(np.where(np.arange(WINDOW) == 3, np.nan, training))
-    with refused("1 of 5"):
-        OutOfRange().fit(np.repeat(training[:1], 5, axis=0))
