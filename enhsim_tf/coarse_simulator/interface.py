@@ -44,9 +44,6 @@ class FunctionSimulator:
         columns: Names of the outputs.
         name: Name of the simulator in messages. None uses the name of the function.
 
-    Raises:
-        InputError: If the function cannot be called.
-
     Example:
     >>> def heater(time_s, scenario=None):
     ...     power = 0.5 if scenario == "weak heater" else 1.0
@@ -55,8 +52,6 @@ class FunctionSimulator:
     """
 
     def __init__(self, function: Callable[..., Any], columns: Sequence[str], name: str | None = None):
-        if not callable(function):
-            raise InputError(f"Expected a function of the times. Received: {type(function).__name__}. Give a function.")
         self.function, self.columns = function, check_columns(columns)
         self.name = name or getattr(function, "__name__", type(function).__name__)
         parameters = inspect.signature(function).parameters

@@ -9,7 +9,6 @@ detectors by name.
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.window_features import window_features
 
 _WIDTH = 25  # samples of a moving deviation
@@ -211,8 +210,6 @@ class ResidualSize:
     """
 
     def __init__(self, bound: float = _BOUND):
-        if not 1 <= bound < np.inf:
-            raise InputError(f"Expected bound >= 1. Received: {bound}.")
         self.bound, self.typical = float(bound), np.nan
 
     def fit_sizes(self, sizes: np.ndarray) -> "ResidualSize":

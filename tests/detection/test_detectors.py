@@ -212,9 +212,3 @@ def test_the_scale_follows_slow_drift_but_no_fault_beyond_the_bound():
     assert np.mean(detector.score_sizes(slow) > threshold) < 0.1 and np.mean(slow > threshold) > 0.5
     lasting = sizes_of(np.concatenate([np.ones(200), np.full(1_000, 2.5)]), 3)  # larger than bound times threshold, however long it lasts
     assert threshold * detector.bound < 1.9 and (detector.score_sizes(lasting)[200:] > threshold).all()
-
-
-@pytest.mark.parametrize("bound", [0.9, np.inf, np.nan])
-def test_a_bound_out_of_range_is_refused(refused, bound):
-    with refused("bound"):
-        ResidualSize(bound)
