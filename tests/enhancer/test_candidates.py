@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.common import training
 from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer import candidates
@@ -75,16 +74,6 @@ def test_level_and_gain_are_those_of_least_squares():
     for channel in range(2):
         gain, level = np.polyfit(inputs[:, :, channel].ravel(), targets[:, :, channel].ravel(), 1)
         np.testing.assert_allclose(predicted[:, :, channel], level + gain * inputs[:, :, channel], atol=1e-4)
-
-
-def test_the_papers_network_has_the_layers_of_figure_3(monkeypatch):
-    def dense_stack(inputs, units, seed, name):
-        raise KeyError(inputs, units)  # before it is trained
-
-    monkeypatch.setattr(training, "dense_stack", dense_stack)
-    with pytest.raises(KeyError) as asked:
-        fit_enhancer(NETWORK, *windows_of(series(), series()))
-    assert asked.value.args == (32, (32, 3_200, 3_200, 32))
 
 
 @pytest.mark.usefixtures("narrow_enhancer")

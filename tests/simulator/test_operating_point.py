@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from enhsim_tf.simulator.operating_point import beyond, find_departure, lasting
+from enhsim_tf.simulator.operating_point import find_departure, lasting
 
 
 @pytest.mark.parametrize(
@@ -26,15 +26,6 @@ def test_samples_without_scores_do_not_count():
     flags, scored = np.zeros(200, bool), np.zeros(200, bool)
     flags[120:], scored[50:100], scored[110:] = True, True, True
     assert lasting(flags, scored, window=10) == 120
-
-
-def test_windows_beyond_the_limits_are_marked():
-    series = np.zeros((60, 1))
-    series[40:] = 3.0
-    limits = np.array([[-1.0], [0.0]]), np.array([[2.0], [2.0]])
-    level, amplitude = beyond(series, limits, 10)
-    np.testing.assert_array_equal(np.flatnonzero(level), np.arange(40, 60))
-    assert not amplitude.any()
 
 
 def departed(level, amplitude, scored):
