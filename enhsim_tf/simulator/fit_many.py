@@ -6,9 +6,7 @@ Each simulator gets a folder of its own, for example `MODEL_DIR/volts/`, with th
 
 import contextlib
 import dataclasses
-import multiprocessing
 import os
-import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -143,7 +141,7 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
 
 
 def fit_or_say(job: Job) -> Outcome:
-    """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
+    """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised."""
     cleaned, outcome = {}, Outcome(job.name)
     for name, series in job.series.items():
         with _failing(outcome, [name]):
@@ -168,12 +166,8 @@ def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
         yield
     except InputError as error:
         outcome.failed |= dict.fromkeys(names, str(error))
-    except (OSError, MemoryError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory"
-        raise InputError(
-            f"Expected enough memory and disk space for {printable(name_of_channels(names))}. Received: {reason}. Finished channels are kept; "
-            "free some space."
-        ) from error
+    except (OSError, MemoryError):  # a full disk or memory, or a reader that has left, concerns all channels
+        raise
     except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
         where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
         said = f"{type(error).__name__}: {reason}, in {Path(where.filename).name}, line {where.lineno}"
@@ -186,7 +180,7 @@ def _fit_group(telemetry: Recording, cleaned: Mapping[str, Cleaned], job: Job, o
     from enhsim_tf.simulator.fitting import fit
 
     name = name_of_channels(telemetry.columns)
-    progress = Progress(_tell_if_heard, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
+    progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
     commands = job.commands if len(job.series) == 1 else None
     interval_s = telemetry.interval_s if telemetry.start is not None else None
     run = None if job.read_run is None else job.read_run(interval_s=interval_s)
@@ -203,12 +197,3 @@ def _fit_group(telemetry: Recording, cleaned: Mapping[str, Cleaned], job: Job, o
     here = os.path.relpath(folder)
     shown = folder if here.startswith("..") else here  # from here, its full path if it is elsewhere
     outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/{instead}"]
-
-
-def _tell_if_heard(line: str) -> None:
-    """Prints a line. A reader that closes the pipe does not stop the fit."""
-    try:
-        tell(line)
-    except BrokenPipeError:
-        if multiprocessing.parent_process() is not None:  # the command itself ends with the code of a closed pipe when its fit is saved
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it at exit

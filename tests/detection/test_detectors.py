@@ -190,10 +190,6 @@ def sizes_of(sds, seed=0):
     return root_mean_square(np.asarray(sds)[:, None] * np.random.default_rng(seed).standard_normal((len(sds), 100)))
 
 
-def test_the_size_is_the_root_mean_square():
-    np.testing.assert_allclose(root_mean_square([[3.0, -4.0], [0.0, 0.0]]), [np.sqrt(12.5), 0.0])
-
-
 def test_the_factor_is_the_median_of_past_sizes_within_its_bounds():
     sizes = np.concatenate([np.ones(20), np.full(100, 1.2), np.full(100, 5.0), np.full(100, 0.5)])
     detector = ResidualSize(1.5).fit_sizes(np.ones(10))
