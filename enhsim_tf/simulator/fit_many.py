@@ -20,6 +20,7 @@ from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
+from enhsim_tf.common.size_limits import short_reason
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.options import FitOptions
@@ -141,7 +142,7 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
 
 
 def fit_or_say(job: Job) -> Outcome:
-    """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised."""
+    """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
     cleaned, outcome = {}, Outcome(job.name)
     for name, series in job.series.items():
         with _failing(outcome, [name]):
@@ -166,8 +167,11 @@ def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
         yield
     except InputError as error:
         outcome.failed |= dict.fromkeys(names, str(error))
-    except (OSError, MemoryError):  # a full disk or memory, or a reader that has left, concerns all channels
+    except BrokenPipeError:  # the reader has left, which ends the command
         raise
+    except (OSError, MemoryError) as error:  # concerns all channels
+        said = f"{short_reason(error)}. Finished channels are kept; free some space."
+        raise InputError(f"Expected enough memory and disk space. Received: {said}") from error
     except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
         where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
         said = f"{type(error).__name__}: {reason}, in {Path(where.filename).name}, line {where.lineno}"
