@@ -6,7 +6,7 @@ from pathlib import Path
 
 from enhsim_tf import __version__
 from enhsim_tf.common.console import Parser
-from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.detection import registry
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions, add_options
 from enhsim_tf.telemetry.registry import SOURCES
 
@@ -23,7 +23,7 @@ with simulator.csv, a recorded run of your own simulator at the times of the tel
 enhsim-tf fit --help shows the options of fit; generate, verify, score, update and inject have help texts too. A separate command,
 python -m enhsim_tf.reproduce, reproduces the paper.
 """
-DETECTORS = tuple(map(option_name, (RESIDUAL, *all_detectors())))
+DETECTORS = tuple(map(registry.option_name, (registry.RESIDUAL, *registry.DETECTORS)))
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
 _OWN, _MODELS = "your own simulator", "output folder of `fit`"  # the title of a group of options, and the help text of MODEL_DIR
 

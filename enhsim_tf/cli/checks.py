@@ -4,7 +4,7 @@ import argparse
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.engines import parse_workers
-from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions, options_from
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 
@@ -36,7 +36,7 @@ def _check_fit(options: argparse.Namespace) -> None:
 
 
 def _check_score(options: argparse.Namespace) -> None:
-    named = {option_name(name): name for name in (RESIDUAL, *all_detectors())}
+    named = {option_name(name): name for name in (RESIDUAL, *DETECTORS)}
     options.chosen = ScoreOptions(named.get(options.detector), options.num_windows, options.false_alarm_rate, options.seed)
     options.cleaning = cleaning_options(options, 2)
 

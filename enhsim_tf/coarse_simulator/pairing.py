@@ -5,11 +5,10 @@ They are cut to the time that they share. A constant delay between them is estim
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.report import iso_time
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
@@ -30,49 +29,45 @@ class Delay:
     undelayed: float = float("nan")  # the same without a delay
 
 
-class Pair(NamedTuple):
-    """A contiguous stretch of telemetry with the coarse run of the same time, float32 of shape `(samples, columns)`."""
-
-    part: int  # number of the part of the telemetry
-    first: int  # sample of the part with which it begins
-    coarse: np.ndarray
-
-
-def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_s: float = 0.0, least_samples: int = 2) -> list[Pair]:
-    """Pairs parts of telemetry, which is so much later, with the run of the same time; returns the pairs in chronological order.
+def pair_recordings(telemetry: Recording, run: Recording, delay_s: float = 0.0, least_samples: int = 2) -> tuple[Recording, Recording]:
+    """Cuts telemetry and a coarse run, which is so much earlier, to the same parts, which both cover, on the clock of the telemetry.
 
     Raises InputError if the two share no time, or no stretch of so many samples.
     """
-    shift_s = _seconds_between(parts[0], recording) + delay_s
-    pairs, longest = [], 0
-    for number, part in enumerate(parts):
-        values = recording.at(part.time_s - shift_s)
-        for first, stop in runs_of(np.isfinite(values).all(axis=1)):
+    clocks, interval_s = [telemetry.clock(part) for part in telemetry.parts], telemetry.interval_s
+    shift_s = _seconds_between(clocks[0], run) + delay_s
+    values, coarse, longest = [], [], 0
+    for part, clock in zip(telemetry.parts, clocks, strict=True):
+        there = run.at(clock.time_s - shift_s)
+        for first, stop in runs_of(np.isfinite(there).all(axis=1)):
             longest = max(longest, stop - first)
             if stop - first >= least_samples:
-                pairs.append(Pair(number, first, values[first:stop]))
-    if not longest and recording.clock().counts and not parts[0].counts:
-        begin = iso_time(nanoseconds(parts[0], 0, 1)[0]).removesuffix("+00:00")
+                begin_s = part.offset_s + interval_s * first
+                values.append(Run(part.values[first:stop], begin_s))
+                coarse.append(Run(there[first:stop], begin_s))
+    if not longest and run.clock().counts and not clocks[0].counts:
+        begin = iso_time(nanoseconds(clocks[0], 0, 1)[0]).removesuffix("+00:00")
         raise InputError(
-            f"Expected a coarse run that overlaps the telemetry in time. Received: dates in {parts[0].name}, times that count from zero in "
-            f"{recording.name}. Give the time of that zero: start (--coarse-start {begin} if the run begins with the telemetry)."
+            f"Expected a coarse run that overlaps the telemetry in time. Received: dates in {telemetry.name}, times that count from zero in "
+            f"{run.name}. Give the time of that zero: start (--coarse-start {begin} if the run begins with the telemetry)."
         )
     if not longest:
         raise InputError(
-            f"Expected a coarse run that overlaps the telemetry in time. Received: {_span(parts, 0.0)} for {parts[0].name}, "
-            f"{_span(list(map(recording.clock, recording.parts)), shift_s)} for {recording.name}, in seconds after the telemetry's start. "
-            "Record the same time, or give --delay."
+            f"Expected a coarse run that overlaps the telemetry in time. Received: {_span(telemetry, 0.0)} for {telemetry.name}, "
+            f"{_span(run, shift_s)} for {run.name}, in seconds after the telemetry's start. Record the same time, or give --delay."
         )
-    if not pairs:
+    if not values:
         raise InputError(
             f"Expected at least {least_samples} samples that telemetry and coarse run share without a gap. Received: {longest}. "
             "Record a longer run, or choose a smaller window."
         )
-    return pairs
+    joined = dataclasses.replace(telemetry, parts=tuple(values))
+    return joined, dataclasses.replace(run, parts=tuple(coarse), interval_s=interval_s, start=telemetry.start)
 
 
-def _span(parts: Sequence[Telemetry], shift_s: float) -> str:
-    return f"{parts[0].offset_s + shift_s:.6g} to {parts[-1].time_s[-1] + shift_s:.6g}"
+def _span(recording: Recording, shift_s: float) -> str:
+    last = recording.clock(recording.parts[-1]).time_s[-1]
+    return f"{recording.parts[0].offset_s + shift_s:.6g} to {last + shift_s:.6g}"
 
 
 def _seconds_between(telemetry: Telemetry, recording: Recording) -> float:
@@ -95,9 +90,8 @@ def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples
     highest, the one nearest to no delay is taken, because a periodic signal has a maximum in every period.
 
     Raises:
-        InputError: If the two share no time, or if the telemetry agrees clearly better at a longer delay.
+        InputError: If the telemetry agrees clearly better at a longer delay.
     """
-    pair_with_recording(parts, recording)  # refuses recordings of another time
     interval_s = parts[0].interval_s
     places = [round((part.offset_s - parts[0].offset_s) / interval_s) for part in parts]
     telemetry = np.full(places[-1] + len(parts[-1]), np.nan)
@@ -105,6 +99,8 @@ def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples
         telemetry[place : place + len(part)] = part.values
     time_s = parts[0].offset_s + interval_s * np.arange(len(telemetry))
     coarse = recording.at(time_s - _seconds_between(parts[0], recording)).astype(np.float64)
+    if not np.isfinite(coarse).all(axis=1).any():
+        return Delay(0.0)  # pairing says that they share no time
     longest = max(max_samples, len(telemetry) // 4)
     delays = np.arange(-longest, longest + 1)
     found = np.stack([_correlation(telemetry, coarse[:, column], delays) for column in range(coarse.shape[1])])

@@ -63,12 +63,11 @@ def read_recording(
     if cleaning.same_time is None:
         cleaning = dataclasses.replace(cleaning, same_time="last")
     table = _table_of(source, cleaning)
-    notes = [] if columns is None or table is None else _compare_columns(list(table), columns, name)
     given = read_source(source, columns, time, cleaning)
     raw, stepped = _at_equal_steps(given, interval_s, cleaning)
     names, cleaned = list(raw), {each: clean(raw[each], cleaning) for each in raw}
     first = cleaned[names[0]].report
-    own_s, has_time = first.interval_s, cleaned[names[0]].longest.has_time
+    own_s, has_time, notes = first.interval_s, cleaned[names[0]].longest.has_time, []
     for each, found in cleaned.items():
         kept = (finding for finding in found.report.findings if finding.kind not in _QUIET and finding.action != "accepted")
         notes += [f"{name}, {each}: {finding.text}" for finding in kept]
@@ -158,18 +157,6 @@ def _table_of(source: Source, cleaning: Cleaning) -> pd.DataFrame | None:
     elif not isinstance(source, pd.DataFrame | pd.Series):
         source = list(map(Path, source))
     return read_table(source, cleaning).frame
-
-
-def _compare_columns(there: Sequence[str], columns: Sequence[str], name: str) -> list[str]:
-    """Refuses a table that lacks a wanted column, and says if the columns are in another order."""
-    missing = [column for column in columns if column not in there]
-    if missing:
-        raise InputError(
-            f"Expected the coarse columns {', '.join(columns)[:120]}. Received: {name} without {missing[0]!r} "
-            f"(it has {', '.join(there)[:120]}). Record that column, or rename it."
-        )
-    places = [there.index(column) for column in columns]
-    return [f"{name}: columns in another order than in the fit, matched by their names"] if places != sorted(places) else []
 
 
 def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float) -> tuple[int, np.ndarray]:

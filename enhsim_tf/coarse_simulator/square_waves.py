@@ -6,7 +6,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -113,10 +113,10 @@ class SquareWaveSimulator:
     def fit(cls, telemetry: Telemetry) -> "SquareWaveSimulator":
         """Fits one square wave to telemetry by least squares; raises InputError if it is no `Telemetry`, or no period is found twice."""
         check_telemetry(telemetry)
-        box = fit_box(telemetry.values.astype(np.float64), telemetry.name)
-        period_s = telemetry.interval_s / box.frequency
-        phase = np.mod(-box.begin - telemetry.offset_s / period_s, 1.0)  # relative to the zero of the series' time axis
-        return cls([SquareWave(period_s, float(phase), box.duty, box.low, box.high)])
+        frequency, begin, duty, low, high = fit_box(telemetry.values.astype(np.float64), telemetry.name)
+        period_s = telemetry.interval_s / frequency
+        phase = np.mod(-begin - telemetry.offset_s / period_s, 1.0)  # relative to the zero of the series' time axis
+        return cls([SquareWave(period_s, float(phase), duty, low, high)])
 
     def get_config(self) -> dict:
         """The settings as plain JSON types, from which `waves_or_level` restores the simulator."""
@@ -169,18 +169,12 @@ def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
     return (low + high) / 2, (high - low) / 2 or 1.0
 
 
-class Box(NamedTuple):
-    """A fitted square wave: one box per cycle, in units of samples."""
+def fit_box(values: np.ndarray, name: str = "the series") -> tuple[float, float, float, float, float]:
+    """Fits a square wave to a series of shape `(samples,)` by least squares; raises InputError with its name if no period is found.
 
-    frequency: float  # cycles per sample
-    begin: float  # phase at which the box begins, from 0 to 1, where sample 0 has phase 0
-    duty: float  # fraction of the cycle inside the box
-    low: float  # mean of the series outside the box
-    high: float  # mean of the series inside the box
-
-
-def fit_box(values: np.ndarray, name: str = "the series") -> Box:
-    """Fits a square wave to a series of shape `(samples,)` by least squares; raises InputError with its name if no period is found."""
+    Returns frequency in cycles per sample, the phase at which the box begins, from 0 to 1, where sample 0 has phase 0, its share of the cycle, and
+    the means of the series outside and inside it.
+    """
     centred, num_samples = values - values.mean(), len(values)
     index = np.arange(num_samples, dtype=np.float64)
 
@@ -205,7 +199,7 @@ def fit_box(values: np.ndarray, name: str = "the series") -> Box:
         step /= 3
     _, begin, duty = _best_box(index * best, centred)
     inside = np.mod(index * best - begin, 1.0) < duty
-    return Box(float(best), begin, duty, float(values[~inside].mean()), float(values[inside].mean()))
+    return float(best), begin, duty, float(values[~inside].mean()), float(values[inside].mean())
 
 
 def _best_box(cycles: np.ndarray, centred: np.ndarray) -> tuple[float, float, float]:

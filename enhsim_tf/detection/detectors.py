@@ -1,13 +1,14 @@
-"""Anomaly detectors without neural networks, and trivial detectors as controls (title and abstract of the paper).
+"""Anomaly detectors, and trivial detectors as controls (title and abstract of the paper).
 
-All have the interface `Detector`. Windows have the shape `(windows, samples)` or `(windows, samples, channels)`; several channels are given in
-units of their standard deviations. `registry` lists all detectors by name.
+A detector has `fit(windows)`, which learns what is nominal and returns the detector, and `score(windows)`, which returns one score for each
+window; higher is more anomalous. Its threshold is chosen by the caller, with `metrics.threshold`. Windows have the shape
+`(windows, samples)` or `(windows, samples, channels)`; several channels are given in units of their standard deviations. `registry` lists all
+detectors by name.
 """
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.window_features import window_features
 
 _WIDTH = 25  # samples of a moving deviation
@@ -71,27 +72,6 @@ class PCAResidual:
             return np.mean((windows - self._pca.inverse_transform(self._pca.transform(windows))) ** 2, axis=1)
 
 
-class NearestNeighbours:
-    """Mean Euclidean distance of a window to so many nearest training windows."""
-
-    def __init__(self, num_neighbours: int = 5):
-        self.num_neighbours = num_neighbours
-
-    def fit(self, windows: np.ndarray) -> "NearestNeighbours":
-        """Stores the nominal windows."""
-        from sklearn.neighbors import NearestNeighbors
-
-        self._index = NearestNeighbors(n_neighbors=min(self.num_neighbours, len(windows)), algorithm="brute")
-        self._mean = np.mean(windows, dtype=np.float64)  # subtracted, because a large offset would reduce the precision of the distances
-        self._index.fit(flat(windows) - self._mean)
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the mean distance, in the unit of the telemetry times the square root of the number of samples."""
-        with threadpool_limits(1):
-            return self._index.kneighbors(flat(windows) - self._mean)[0].mean(axis=1)
-
-
 class IsolationForestOnFeatures:
     """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`."""
 
@@ -108,25 +88,6 @@ class IsolationForestOnFeatures:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the anomaly score of the forest."""
         return -self._forest.score_samples(features(windows))
-
-
-class OneClassSVMOnFeatures:
-    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`."""
-
-    def fit(self, windows: np.ndarray) -> "OneClassSVMOnFeatures":
-        """Fits the decision boundary, which leaves at most 1 % of the nominal windows outside."""
-        from sklearn.pipeline import make_pipeline
-        from sklearn.preprocessing import StandardScaler
-        from sklearn.svm import OneClassSVM
-
-        with threadpool_limits(1):
-            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=0.01)).fit(features(windows))
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the signed distance from the decision boundary, which is negative inside."""
-        with threadpool_limits(1):
-            return -self._machine.decision_function(features(windows))
 
 
 class JointMeans:
@@ -249,8 +210,6 @@ class ResidualSize:
     """
 
     def __init__(self, bound: float = _BOUND):
-        if not 1 <= bound < np.inf:
-            raise InputError(f"Expected bound >= 1. Received: {bound}.")
         self.bound, self.typical = float(bound), np.nan
 
     def fit_sizes(self, sizes: np.ndarray) -> "ResidualSize":

@@ -76,11 +76,9 @@ def choose_enhancer(
         progress: Tells the name of each candidate before it is fitted.
 
     Raises:
-        InputError: If the name is unknown, shapes do not match, a value is not finite, or there is too little time.
+        InputError: If the name is unknown, or there is too little time.
     """
-    inputs, targets, starts = _checked(inputs, targets, starts)
-    if wanted not in (BEST, *CANDIDATES):
-        raise InputError(f"Expected an enhancer, one of: {BEST}, {', '.join(CANDIDATES)}. Received: {wanted!r}.")
+    inputs, targets = _with_channels(inputs), _with_channels(targets)
     window = inputs.shape[1]
     edges = block_edges(int(starts.min()), int(starts.max()) + window, window)
     rows, held_out = split_fold(starts, window, edges, fold=0)
@@ -140,9 +138,9 @@ def fit_enhancer(
         penalties: Penalty of each channel, as `Choice.penalties` of similar windows; None: chosen by blocks of time.
 
     Raises:
-        InputError: If the name is unknown, shapes do not match, or a value is not finite.
+        InputError: If the name is unknown, or the training diverges.
     """
-    return _Training(*_checked(inputs, targets, starts), penalties).fit(name, seed, epochs)
+    return _Training(_with_channels(inputs), _with_channels(targets), starts, penalties).fit(name, seed, epochs)
 
 
 class _Training:
@@ -238,19 +236,10 @@ def _deviations(windows: np.ndarray) -> np.ndarray:
     return np.where(deviation > 1e-6 * np.abs(windows).max(axis=(0, 1), initial=0), deviation, 1.0)
 
 
-def _checked(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Checks training windows and adds the axis of columns or channels if it is missing."""
-    inputs, targets, starts = (np.asarray(each) for each in (inputs, targets, starts))
-    inputs, targets = (each[:, :, None] if each.ndim == 2 else each for each in (inputs, targets))
-    shapes = inputs.ndim == targets.ndim == 3 and inputs.shape[:2] == targets.shape[:2] and starts.shape == inputs.shape[:1]
-    if not (shapes and inputs.size and targets.size):
-        raise InputError(
-            "Expected inputs of shape (windows, samples, columns), targets (windows, samples, channels) and starts (windows,). "
-            f"Received: {inputs.shape}, {targets.shape}, {starts.shape}."
-        )
-    if not (np.isfinite(inputs).all() and np.isfinite(targets).all()):
-        raise InputError("Expected finite windows. Received: NaN or infinite values. Fill or cut them.")
-    return inputs, targets, starts
+def _with_channels(windows: np.ndarray) -> np.ndarray:
+    """Adds the axis of columns or channels if it is missing."""
+    windows = np.asarray(windows)
+    return windows[:, :, None] if windows.ndim == 2 else windows
 
 
 def block_edges(begin: int, end: int, window: int) -> np.ndarray:

@@ -3,10 +3,7 @@
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.common.errors import InputError
-
 _CHUNK = 2_048  # number of windows scored at a time
-_MAX_KEPT = 10_000  # maximum number of training windows whose coordinates are kept
 _EXPLAINED = 0.95  # share of the training windows' variance that the components explain
 _WEIGHT = 0.25  # of the distance within the subspace; with 1, the score is about the distance to the nearest training window
 
@@ -30,15 +27,8 @@ class OutOfRange:
     """
 
     def fit(self, coarse_windows: np.ndarray) -> "OutOfRange":
-        """Fits to the enhancer's training windows, shape `(windows, samples)`. Duplicate windows are counted once.
-
-        Raises:
-            InputError: If there are fewer than two distinct windows, or if a value is not finite.
-        """
-        windows = _checked(coarse_windows)
-        distinct = np.unique(windows, axis=0)
-        if len(distinct) < 2:
-            raise InputError(f"Expected at least two distinct coarse windows. Received: {len(distinct)} of {len(windows)}.")
+        """Fits to the enhancer's training windows, shape `(windows, samples)`, of which at least two differ. Duplicates are counted once."""
+        distinct = np.unique(np.asarray(coarse_windows, np.float64), axis=0)
         self._mean = distinct.mean(axis=0)
         centred = distinct - self._mean
         self._unit = np.sqrt(np.mean(centred**2))
@@ -46,17 +36,12 @@ class OutOfRange:
             _, values, directions = np.linalg.svd(centred, full_matrices=False)
             share = np.cumsum(values**2) / np.sum(values**2)
             self._components = directions[: np.searchsorted(share, _EXPLAINED) + 1].copy()
-            coordinates = centred[:: -(-len(centred) // _MAX_KEPT)] @ self._components.T
-        self._coordinates = coordinates.astype(np.float32)
+            self._coordinates = (centred @ self._components.T).astype(np.float32)
         return self
 
     def score(self, coarse_windows: np.ndarray) -> np.ndarray:
-        """Scores coarse windows of shape `(windows, samples)`, float64 of shape `(windows,)`: close to 0 within the training range.
-
-        Raises:
-            InputError: If the windows have another length than in the fit, or a value is not finite.
-        """
-        windows = _checked(coarse_windows, len(self._mean))
+        """Scores coarse windows of shape `(windows, samples)`, float64 of shape `(windows,)`: close to 0 within the training range."""
+        windows = np.asarray(coarse_windows, np.float64)
         with threadpool_limits(1):
             chunks = [self._score(windows[begin : begin + _CHUNK]) for begin in range(0, len(windows), _CHUNK)]
         return np.concatenate([np.zeros(0), *chunks])
@@ -69,11 +54,3 @@ class OutOfRange:
         left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
         nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
         return np.sqrt((left + _WEIGHT * nearest) / windows.shape[1]) / self._unit
-
-
-def _checked(windows: np.ndarray, num_samples: int | None = None) -> np.ndarray:
-    windows = np.asarray(windows, np.float64)
-    if windows.ndim != 2 or num_samples not in (None, windows.shape[-1]) or not np.isfinite(windows).all():
-        wanted = "samples" if num_samples is None else num_samples
-        raise InputError(f"Expected finite coarse windows of shape (windows, {wanted}). Received: shape {windows.shape}.")
-    return windows

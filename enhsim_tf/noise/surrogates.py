@@ -89,10 +89,9 @@ class GaussianAutoregression(_Stationary):
     def fit(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianAutoregression":
         """Fits to windows of shape `(windows, samples)` by Burg's method (1975), which always gives a stationary process.
 
-        The Akaike information criterion chooses the order. Raises InputError if the windows are not longer than `max_order`, or constant.
+        The Akaike information criterion chooses the order, at most `max_order`, which is below the number of samples. Raises InputError if the
+        windows are constant.
         """
-        if windows.shape[1] <= max_order:
-            raise InputError(f"Expected windows of more samples than max_order={max_order}. Received: {windows.shape[1]} samples.")
         forward = backward = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
         variance, coefficients = np.mean(forward**2), np.zeros(0)
         if not variance > 0:

@@ -9,25 +9,17 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded, held_samples
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
-from enhsim_tf.coarse_simulator.pairing import pair_with_recording
+from enhsim_tf.coarse_simulator.pairing import pair_recordings
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, waves_or_level
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.simulator.joint import cut, long_enough, telemetry_of, windows_of
+from enhsim_tf.simulator.joint import long_enough, windows_of
 from enhsim_tf.telemetry.windows import num_window_starts
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
 START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the waveform
 _SAME_PERIOD = 0.02  # largest relative difference of periods that are one clock
-
-
-class Aligned(NamedTuple):
-    """Coarse windows of the same times as telemetry windows, float32, and offset and gain of each window and channel, in float64."""
-
-    coarse: np.ndarray
-    shift: np.ndarray
-    gain: np.ndarray
 
 
 class Drawn(NamedTuple):
@@ -58,7 +50,6 @@ class Waves:
         self.simulators, self.channels = tuple(simulators), tuple(channels)
         self.interval_s, self.window = float(interval_s), int(window)
         self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
-        self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -71,8 +62,11 @@ class Waves:
         starts = period_s * np.arange(_NUM_PHASES) / _NUM_PHASES
         return self._in_unit(channel, self.simulators[channel].simulate(starts[:, None] + self.interval_s * np.arange(self.window)))
 
-    def align(self, targets: np.ndarray) -> Aligned:
-        """Finds phase, offset and gain of each channel in telemetry windows of shape `(windows, samples, channels)`."""
+    def align(self, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Finds phase, offset and gain of each channel in telemetry windows of shape `(windows, samples, channels)`.
+
+        Returns coarse windows of the same times, float32, and offset and gain of each window and channel, float64.
+        """
         coarse = np.zeros(targets.shape, np.float32)
         shift, gain = np.zeros((2, len(targets), targets.shape[2]))
         for channel, simulator in enumerate(self.simulators):
@@ -83,7 +77,7 @@ class Waves:
             best = self.best_phases(targets, channel)
             coarse[:, :, channel] = self.phases(channel)[best]
             shift[:, channel], gain[:, channel] = least_squares(self._waveform(channel)[best], target)
-        return Aligned(coarse, shift, gain)
+        return coarse, shift, gain
 
     def _waveform(self, channel: int) -> np.ndarray:
         return self.phases(channel) if self.waveforms[channel] is None else self.waveforms[channel]
@@ -124,16 +118,21 @@ class Waves:
         for row, scenario in enumerate(scenarios):
             if scenario is not None:
                 rows_of.setdefault(scenario, []).append(row)
-        nominal = np.concatenate([self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2)
+        nominal = self._nominal(self._times(starts))
         changes = [(channel, rows, scenario, 0, self.window) for scenario, rows in rows_of.items() for channel in self._concerned(scenario)]
         return self._degraded(nominal, self._times(starts), changes, rng) if changes else Drawn(nominal, nominal)
 
     def draw_series(self, num_samples: int, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
         """Simulates one coarse series, as a single window of `num_samples`; each event is a mode, its first sample and its end."""
-        times, numbers = (self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
-        nominal = np.stack([self._in_unit(channel, self.simulators[channel].simulate(times)) for channel in numbers], axis=2)
-        changes = [(channel, [0], *event) for channel in numbers for event in events if channel in self._concerned(event[0])]
-        return self._degraded(nominal, times, changes, rng)
+        times = (self.interval_s * np.arange(num_samples))[None]
+        changes = [
+            (channel, [0], *event) for channel in range(len(self.simulators)) for event in events if channel in self._concerned(event[0])
+        ]
+        return self._degraded(self._nominal(times), times, changes, rng)
+
+    def _nominal(self, times: np.ndarray) -> np.ndarray:
+        """Simulates nominal windows of all channels at times of shape `(windows, samples)`."""
+        return np.stack([self._in_unit(channel, each.simulate(times)) for channel, each in enumerate(self.simulators)], axis=2)
 
     def _degraded(
         self, nominal: np.ndarray, times: np.ndarray, changes: Sequence[tuple[int, list[int], Degraded, int, int]], rng: np.random.Generator
@@ -148,16 +147,6 @@ class Waves:
             if stuck is not None:
                 held[rows, begin + stuck[0] : begin + stuck[1], channel], is_stuck = begin + stuck[0], True
         return Drawn(coarse, nominal, held if is_stuck else None)
-
-    def _nominal(self, channel: int, starts: np.ndarray) -> np.ndarray:
-        """Simulates nominal windows of a channel, shape `(windows, samples, 1)`; many are cut out of one series that is kept."""
-        simulator, length = self.simulators[channel], int(starts.max(initial=0)) + self.window
-        if length > len(self._series[channel]):
-            if 2 * len(starts) * self.window < length:
-                return self._in_unit(channel, simulator.simulate(self._times(starts)))[:, :, None]
-            times = self.interval_s * np.arange(1 << length.bit_length())  # the next windows are hardly ever beyond its end
-            self._series[channel] = self._in_unit(channel, simulator.simulate(times[None]))[0][:, None]
-        return cut(self._series[channel : channel + 1], starts, self.window)
 
     def _times(self, starts: np.ndarray) -> np.ndarray:
         return self.interval_s * (starts[:, None] + np.arange(self.window))
@@ -302,18 +291,6 @@ def recording_of(
 
 
 Alignment = Waves | Runs
-
-
-def pair_recordings(telemetry: Recording, run: Recording, delay_s: float, least_samples: int) -> tuple[Recording, Recording]:
-    """Cuts telemetry and a coarse run to the same parts, which both cover, on the clock of the telemetry; see `pair_with_recording`."""
-    values, coarse, interval_s = [], [], telemetry.interval_s
-    for pair in pair_with_recording(telemetry_of(telemetry), run, delay_s, least_samples):
-        part = telemetry.parts[pair.part]
-        begin_s = part.offset_s + interval_s * pair.first
-        values.append(Run(part.values[pair.first : pair.first + len(pair.coarse)], begin_s))
-        coarse.append(Run(pair.coarse, begin_s))
-    joined = dataclasses.replace(telemetry, parts=tuple(values))
-    return joined, dataclasses.replace(run, parts=tuple(coarse), interval_s=interval_s, start=telemetry.start)
 
 
 def least_squares(waveform: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -73,17 +73,14 @@ def choose_coarse(
             f"Expected at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from. Received: {len(values)} samples of "
             f"{name}, the longest part {len(longest)}. Give more telemetry or a smaller window."
         )
-    about_commands = "its file has no commands"
     if traces is not None and by_commands:
         said = (
             f"coarse simulator: traces of {len(traces.chosen)} of the commands, which explain {by_commands:.0%} of the variance on held-out time; "
             f"{about_wave}. It knows only what the commands tell."
         )
         return CoarseChoice(fitting, said, traces=traces)
-    if commands is not None:
-        about_commands = "no command was sent" if traces is None else "its commands explain no more of it than commands at other times"
     said = (
-        f"coarse simulator: none, only a constant level, because {about_wave}, and {about_commands}. The simulator knows no shape and no times: "
+        f"coarse simulator: none, only a constant level, because {about_wave}, and no command explains it. The simulator knows no shape and no times: "
         f"it generates noise around levels of the record. Of the degraded modes, only drift and dropout change it, and in a series stuck."
     )
     level = ConstantLevel(values.mean(), values.std(), 2 * fitting * longest.interval_s)

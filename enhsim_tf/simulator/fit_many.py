@@ -6,9 +6,7 @@ Each simulator gets a folder of its own, for example `MODEL_DIR/volts/`, with th
 
 import contextlib
 import dataclasses
-import multiprocessing
 import os
-import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -22,6 +20,7 @@ from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
+from enhsim_tf.common.size_limits import short_reason
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.options import FitOptions
@@ -168,12 +167,11 @@ def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
         yield
     except InputError as error:
         outcome.failed |= dict.fromkeys(names, str(error))
-    except (OSError, MemoryError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory"
-        raise InputError(
-            f"Expected enough memory and disk space for {printable(name_of_channels(names))}. Received: {reason}. Finished channels are kept; "
-            "free some space."
-        ) from error
+    except BrokenPipeError:  # the reader has left, which ends the command
+        raise
+    except (OSError, MemoryError) as error:  # concerns all channels
+        said = f"{short_reason(error)}. Finished channels are kept; free some space."
+        raise InputError(f"Expected enough memory and disk space. Received: {said}") from error
     except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
         where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
         said = f"{type(error).__name__}: {reason}, in {Path(where.filename).name}, line {where.lineno}"
@@ -186,7 +184,7 @@ def _fit_group(telemetry: Recording, cleaned: Mapping[str, Cleaned], job: Job, o
     from enhsim_tf.simulator.fitting import fit
 
     name = name_of_channels(telemetry.columns)
-    progress = Progress(_tell_if_heard, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
+    progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
     commands = job.commands if len(job.series) == 1 else None
     interval_s = telemetry.interval_s if telemetry.start is not None else None
     run = None if job.read_run is None else job.read_run(interval_s=interval_s)
@@ -203,12 +201,3 @@ def _fit_group(telemetry: Recording, cleaned: Mapping[str, Cleaned], job: Job, o
     here = os.path.relpath(folder)
     shown = folder if here.startswith("..") else here  # from here, its full path if it is elsewhere
     outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/{instead}"]
-
-
-def _tell_if_heard(line: str) -> None:
-    """Prints a line. A reader that closes the pipe does not stop the fit."""
-    try:
-        tell(line)
-    except BrokenPipeError:
-        if multiprocessing.parent_process() is not None:  # the command itself ends with the code of a closed pipe when its fit is saved
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it at exit

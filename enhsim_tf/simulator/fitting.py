@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
-from enhsim_tf.coarse_simulator.pairing import Delay, estimate_delay
+from enhsim_tf.coarse_simulator.pairing import Delay, estimate_delay, pair_recordings
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel
 from enhsim_tf.common.console import SILENT, Progress
@@ -18,7 +18,7 @@ from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, choose_enhancer, fi
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
 from enhsim_tf.noise.names import BEST as BEST_NOISE
-from enhsim_tf.simulator.alignment import Runs, Waves, pair_recordings
+from enhsim_tf.simulator.alignment import Runs, Waves
 from enhsim_tf.simulator.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse
 from enhsim_tf.simulator.detector_choice import choose_detector, judge_detectors
 from enhsim_tf.simulator.joint import join_channels, long_enough, split_end, telemetry_of, times_of, windows_of

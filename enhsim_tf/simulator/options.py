@@ -5,7 +5,7 @@ import dataclasses
 from typing import Any
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
 from enhsim_tf.enhancer.names import BEST, CANDIDATES
 from enhsim_tf.noise.names import CANDIDATES as NOISES
 
@@ -107,7 +107,7 @@ class ScoreOptions:
     seed: int = _option(0, "random seed (default: 0)", least=0, most=2**31 - 1)
 
     def __post_init__(self):
-        known = (RESIDUAL, *all_detectors())
+        known = (RESIDUAL, *DETECTORS)
         if self.detector is not None and self.detector not in known:
             raise InputError(f"Expected a detector, one of: {', '.join(known)}. Received: {self.detector!r}.")
         for field in dataclasses.fields(self)[1:]:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.detection import metrics
-from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhancer.candidates import block_edges, fit_enhancer, split_fold
 from studies.battery.faults import ALL, Fault, columns_of
 from studies.battery.orbits import ORBIT_SAMPLES
 from studies.battery.record import WINDOW, PairWindows, Runs, coarse_windows, judged_windows, pair_windows, run_key
+from studies.common.detectors import DETECTORS
 
 COARSE, WITH_RESIDUALS, REAL_15, REAL_120 = "coarse", "enhanced + residual windows", "real, 15 orbits", "real, 120 orbits"
 SOURCES = (COARSE, WITH_RESIDUALS, REAL_15, REAL_120)

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from enhsim_tf.detection.interface import Detector
-from enhsim_tf.detection.registry import FURTHER
+from enhsim_tf.detection import registry
+from studies.common.detectors import Detector
 
 
 class RandomScore:
@@ -29,6 +29,6 @@ class RandomScore:
 
 CONTROLS: dict[str, Callable[[int], Detector]] = {
     "random score": RandomScore,
-    **{name: FURTHER[name] for name in ("largest step", "moving deviation")},
+    **{name: registry.DETECTORS[name] for name in ("largest step", "moving deviation")},
 }
 """Maps each control's name to a factory, which takes a seed."""

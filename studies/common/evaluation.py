@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject
-from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.metrics import recall, threshold
 from enhsim_tf.telemetry.windows import time_blocks
+from studies.common.detectors import Detector
 from studies.common.metrics import recall_at_real_rate
 
 _NUM_BLOCKS = 10  # consecutive blocks of time for which false alarms are counted separately

@@ -12,7 +12,7 @@ from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise.surrogates import GaussianAutoregression
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
-from studies.common import evaluation
+from studies.common import detectors, evaluation
 from studies.factorial.cells import (
     AUTOREGRESSION,
     DETECTORS,
@@ -87,11 +87,9 @@ class Pipelines:
         """
         import pandas as pd
 
-        from enhsim_tf.detection import registry
-
-        detectors = {name: registry.DETECTORS[name] for name in DETECTORS}
+        makers = {name: detectors.DETECTORS[name] for name in DETECTORS}
         training, held_out = (self.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
-        tables = evaluation.evaluate_arm(training, held_out, self._trial, detectors, self.seed)
+        tables = evaluation.evaluate_arm(training, held_out, self._trial, makers, self.seed)
         alarms, recall = (pd.DataFrame(tables[name]).groupby("detector", sort=False) for name in ("alarms", "recall"))
         rows = alarms[["alarms", "windows"]].sum().join(recall[["recall", "recall_at_real_rate"]].mean()).reset_index()
         return rows.to_dict("records")

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.noise.candidates import NoiseModel
 from enhsim_tf.noise.names import CANDIDATES
 from enhsim_tf.simulator.noise_choice import MOST_JUDGED, HeldOutJudge, NoiseWindows
 from studies.common import evaluation
+from studies.common.detectors import DETECTORS
 from studies.common.settings import Settings
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 from studies.noise_models.real_floor import RealFloor, Row

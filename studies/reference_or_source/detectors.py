@@ -11,6 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.detection import detectors, metrics
+from studies.common.detectors import NearestNeighbours
 from studies.reference_or_source.windows import by_fold
 
 RATE = 0.01
@@ -37,7 +38,7 @@ class Discord:
 
     def fit(self, windows: np.ndarray) -> "Discord":
         """Keeps the known windows."""
-        self._nearest = detectors.NearestNeighbours(1).fit(self._normal(windows))
+        self._nearest = NearestNeighbours(1).fit(self._normal(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -54,7 +55,7 @@ ONE_CLASS: Mapping[str, Callable[[int], Any]] = {
     "size": lambda seed: Size(),
     "joint size": lambda seed: detectors.JointMeans(),
     "PCA residual": lambda seed: detectors.PCAResidual(seed=seed),
-    "nearest neighbours": lambda seed: detectors.NearestNeighbours(),
+    "nearest neighbours": lambda seed: NearestNeighbours(),
     "vector autoregression": lambda seed: detectors.Innovation(),
 }
 ONE_LINERS: Mapping[str, Callable[[int], Any]] = {

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhancer.ridge import Ridge, fit_ridge
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from studies.common import evaluation
 from studies.common.controls import CONTROLS
+from studies.common.detectors import DETECTORS
 from studies.common.example import Example
 from studies.common.settings import Settings
 

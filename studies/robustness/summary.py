@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.detection.registry import DETECTORS
 from studies.common.controls import CONTROLS
+from studies.common.detectors import DETECTORS
 from studies.common.noise_processes import NOISES
 from studies.common.statistics import mean_interval
 from studies.common.tables import KeptTables

@@ -65,8 +65,6 @@ def test_unusable_output_is_refused(refused, returned, word):
 def test_what_is_no_simulator_and_names_of_columns_are_refused(refused):
     with refused("FunctionSimulator", "function"):
         simulate(heater, TIMES)
-    with refused("function"):
-        FunctionSimulator("heater", ["power"])
     for columns in ([], ["a", "a"], [3]):
         with refused("columns"):
             FunctionSimulator(heater, columns)

@@ -5,8 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.pairing import _correlation, estimate_delay, pair_with_recording
+from enhsim_tf.coarse_simulator.pairing import _correlation, estimate_delay, pair_recordings
 from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.telemetry.series import Telemetry
 
 START = "2024-01-01T00:00:00+00:00"
@@ -24,6 +25,12 @@ def pair_of(values, delay, others=(), interval_s=10.0, noise=0.3):
     columns = np.stack([*others, values], axis=1).astype(np.float32)
     recording = Recording((Run(columns),), tuple(f"c{number}" for number in range(columns.shape[1])), interval_s, START)
     return Telemetry(telemetry.astype(np.float32), interval_s, 0.0, START, "volts"), recording
+
+
+def recorded(parts):
+    """Parts of telemetry as a recording."""
+    (found,) = join_channels({"volts": parts})
+    return found
 
 
 @pytest.mark.parametrize("delay", [0, 1, -64])
@@ -62,27 +69,27 @@ def test_a_delay_longer_than_a_window_is_refused_with_the_delay_to_give(refused)
     telemetry, recording = pair_of(drive(), 200)
     with refused("at most a window, 64 samples", "--delay 2000"):
         estimate_delay([telemetry], recording, 64)
-    (pair,) = pair_with_recording([telemetry], recording, 2_000.0)
-    assert pair.first == 200 and np.corrcoef(telemetry.values[200:], pair.coarse[:, 0])[0, 1] > 0.9
+    found, run = pair_recordings(recorded([telemetry]), recording, 2_000.0)
+    assert found.parts[0].offset_s == 2_000 and np.corrcoef(found.values[:, 0], run.values[:, 0])[0, 1] > 0.9
 
 
 def test_both_are_cut_to_the_time_they_share():
     telemetry, recording = pair_of(drive(), 0, noise=0)
     recording = dataclasses.replace(recording, start="2024-01-01T00:10:00+00:00", parts=(Run(recording.parts[0].values[60:1_000]),))
     parts = [telemetry.part(0, 500), telemetry.part(520, 2_000)]
-    pairs = pair_with_recording(parts, recording)
-    assert [(pair.part, pair.first, len(pair.coarse)) for pair in pairs] == [(0, 60, 440), (1, 0, 480)]
-    for part, first, coarse in pairs:
-        np.testing.assert_allclose(parts[part].values[first : first + len(coarse)], coarse[:, 0], atol=1e-5)
+    found, run = pair_recordings(recorded(parts), recording)
+    assert [(part.offset_s, len(part)) for part in found.parts] == [(600.0, 440), (5_200.0, 480)]
+    assert [part.offset_s for part in run.parts] == [600.0, 5_200.0]
+    np.testing.assert_allclose(found.values, run.values, atol=1e-5)
 
 
 def test_runs_of_another_time_are_refused(refused):
     telemetry, recording = pair_of(drive(), 0)
     elsewhere = dataclasses.replace(recording, start="2025-01-01T00:00:00+00:00")
-    for work in (lambda: pair_with_recording([telemetry], elsewhere), lambda: estimate_delay([telemetry], elsewhere, 64)):
-        with refused("overlaps the telemetry in time", "--delay"):
-            work()
+    assert estimate_delay([telemetry], elsewhere, 64).column is None
+    with refused("overlaps the telemetry in time", "--delay"):
+        pair_recordings(recorded([telemetry]), elsewhere)
     with refused("in both the telemetry and the coarse run, or in neither"):
-        pair_with_recording([telemetry], dataclasses.replace(recording, start=None))
+        pair_recordings(recorded([telemetry]), dataclasses.replace(recording, start=None))
     with refused("at least 3000 samples"):
-        pair_with_recording([telemetry], recording, least_samples=3_000)
+        pair_recordings(recorded([telemetry]), recording, least_samples=3_000)

@@ -7,15 +7,6 @@ from numpy.random import default_rng
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise, JointAutoregression
 
 
-def test_gaussian_noise_recovers_the_standard_deviation():
-    windows = default_rng(0).normal(0, 0.3, (400, 500)).astype(np.float32)
-    fitted = GaussianNoise.fit(windows)
-    assert float(fitted.root) == pytest.approx(0.3, rel=5 / np.sqrt(2 * windows.size))
-    noise = fitted.generate(300, default_rng(1))
-    assert noise.shape == (300, 500) and noise.dtype == np.float32
-    assert np.std(noise) == pytest.approx(float(fitted.root), rel=5 / np.sqrt(2 * noise.size))
-
-
 def test_gaussian_noise_of_several_channels_keeps_their_covariance():
     covariance = np.array([[4.0, 1.2, 0.0], [1.2, 1.0, 0.0], [0.0, 0.0, 0.0]])  # the third channel is constant
     source = default_rng(0).multivariate_normal(np.zeros(3), covariance, (400, 100)).astype(np.float32)
@@ -60,12 +51,6 @@ def test_akaike_chooses_the_order_that_least_squares_would():
     chosen = len(GaussianAutoregression.fit(windows, max_order=8).coefficients)
     assert chosen == np.argmin([criterion(windows, order) for order in range(9)]) >= 2
     assert np.abs(GaussianAutoregression.fit(windows).coefficients[2:]) == pytest.approx(0, abs=5 / np.sqrt(windows.size))
-
-
-def test_white_noise_needs_no_coefficients():
-    windows = default_rng(2).normal(3, 0.2, (100, 200))
-    fitted = GaussianAutoregression.fit(windows, max_order=4)
-    assert len(fitted.coefficients) == 0 and fitted.innovation_sd == pytest.approx(np.std(windows))
 
 
 def test_generated_autoregression_is_stationary_and_has_the_closed_form():
@@ -114,5 +99,5 @@ def test_autoregressions_that_are_refused(refused):
         GaussianAutoregression([1.2], 0.1, 50)
     with refused("stationary"):
         GaussianAutoregression([0.5, 0.5], 0.1, 50)  # a root on the unit circle
-    with refused("max_order=40", "30 samples"):
-        GaussianAutoregression.fit(np.ones((5, 30)))
+    with refused("noise that varies"):
+        GaussianAutoregression.fit(np.ones((5, 30)), 4)

@@ -90,14 +90,3 @@ def test_telemetry_that_cannot_be_fitted_is_refused(words, telemetry, others):
 def test_an_option_out_of_range_is_refused_by_its_name(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
         FitOptions(**wrong)
-
-
-@pytest.mark.usefixtures("narrow_enhancer")
-def test_the_network_that_is_asked_for_is_trained_and_saved_as_arrays(tmp_path):
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
-
-    options = FitOptions(window=64, num_windows=150, enhancer="network", noise="gaussian", epochs=2, held_out=0.0)
-    simulator, report = fit(series(1_500), options=options)
-    assert simulator.enhancer.layers and [each["name"] for each in report.enhancers if each["is_chosen"]] == ["network"]
-    simulator.save(tmp_path / "model")
-    np.testing.assert_array_equal(EnhancedSimulator.load(tmp_path / "model").generate(3), simulator.generate(3))

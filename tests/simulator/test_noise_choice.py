@@ -12,7 +12,6 @@ from enhsim_tf.simulator.noise_choice import (
     choose,
     choose_noise,
     pieces_of,
-    signal_edges,
     signal_features,
 )
 
@@ -90,12 +89,6 @@ def test_noise_on_levels_is_not_told_from_itself_by_rounding_errors_of_32_bits()
     learnt, judged = (NoiseWindows(stored[some], signal32[some], places[some]) for some in (slice(0, 300), slice(300, None)))
     judgement = HeldOutJudge(learnt, judged, seed=0).judge("exact", WindowBootstrap(exact), rng)
     assert judgement.auc < 0.58
-
-
-def test_edges_divide_levels_and_slopes_into_thirds():
-    signal = np.arange(30.0).reshape(3, 10) ** 2
-    for values, (low, high) in zip((signal, np.gradient(signal, axis=1)), signal_edges(signal), strict=True):
-        assert np.sum(values <= low) == pytest.approx(10, abs=1) and np.sum(values > high) == pytest.approx(10, abs=1)
 
 
 def test_features_are_mean_and_scale_of_the_noise_at_each_level_and_slope():

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES
-from enhsim_tf.detection.registry import DETECTORS
 from studies.common.controls import CONTROLS
+from studies.common.detectors import DETECTORS
 from studies.common.settings import make_settings
 from studies.few_windows.cells import QUICK
 from studies.noise_models import cells

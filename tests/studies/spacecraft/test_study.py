@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.telemetry.series import Telemetry
+from studies.common.detectors import DETECTORS
 from studies.spacecraft import summary, training_data
 from studies.spacecraft.__main__ import command
 from studies.spacecraft.channel import stretches

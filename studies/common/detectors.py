@@ -1,11 +1,66 @@
-"""Anomaly detectors that use the reconstruction error of an autoencoder (title and abstract of the paper).
+"""Detectors of the studies, beside those of the tool: neighbours, a support vector machine, and two autoencoders.
 
-Keras is imported only when a detector is trained.
+Keras is imported only when an autoencoder is trained.
 """
 
-import numpy as np
+from collections.abc import Callable
+from typing import Any, Protocol
 
-from enhsim_tf.detection.detectors import flat
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from enhsim_tf.detection import registry
+from enhsim_tf.detection.detectors import features, flat
+
+
+class Detector(Protocol):
+    """An anomaly detector for windows of telemetry. Its threshold is chosen by the caller."""
+
+    def fit(self, windows: np.ndarray) -> "Detector":
+        """Learns what is nominal from windows of shape `(windows, samples)`, and returns the detector."""
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns one anomaly score for each window, shape `(windows,)`; higher is more anomalous."""
+
+
+class NearestNeighbours:
+    """Mean Euclidean distance of a window to so many nearest training windows."""
+
+    def __init__(self, num_neighbours: int = 5):
+        self.num_neighbours = num_neighbours
+
+    def fit(self, windows: np.ndarray) -> "NearestNeighbours":
+        """Stores the nominal windows."""
+        from sklearn.neighbors import NearestNeighbors
+
+        self._index = NearestNeighbors(n_neighbors=min(self.num_neighbours, len(windows)), algorithm="brute")
+        self._mean = np.mean(windows, dtype=np.float64)  # subtracted, because a large offset would reduce the precision of the distances
+        self._index.fit(flat(windows) - self._mean)
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the mean distance, in the unit of the telemetry times the square root of the number of samples."""
+        with threadpool_limits(1):
+            return self._index.kneighbors(flat(windows) - self._mean)[0].mean(axis=1)
+
+
+class OneClassSVMOnFeatures:
+    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`."""
+
+    def fit(self, windows: np.ndarray) -> "OneClassSVMOnFeatures":
+        """Fits the decision boundary, which leaves at most 1 % of the nominal windows outside."""
+        from sklearn.pipeline import make_pipeline
+        from sklearn.preprocessing import StandardScaler
+        from sklearn.svm import OneClassSVM
+
+        with threadpool_limits(1):
+            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=0.01)).fit(features(windows))
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the signed distance from the decision boundary, which is negative inside."""
+        with threadpool_limits(1):
+            return -self._machine.decision_function(features(windows))
 
 
 class _Autoencoder:
@@ -81,3 +136,15 @@ class ConvolutionalAutoencoder(_Autoencoder):
         from enhsim_tf.common.training import predict_windows
 
         return predict_windows(self._network, scaled, 1_024)
+
+
+DETECTORS: dict[str, Callable[[int], Any]] = {
+    "limit check": registry.DETECTORS["limit check"],
+    "PCA residual": registry.DETECTORS["PCA residual"],
+    "nearest neighbours": lambda seed: NearestNeighbours(),
+    "isolation forest": registry.DETECTORS["isolation forest"],
+    "one-class SVM": lambda seed: OneClassSVMOnFeatures(),
+    "dense autoencoder": lambda seed: DenseAutoencoder(seed=seed),
+    "convolutional autoencoder": lambda seed: ConvolutionalAutoencoder(seed=seed),
+}
+"""Maps a name to a factory, which takes a seed and returns an unfitted detector; the simplest first, and the networks last."""
