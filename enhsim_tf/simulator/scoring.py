@@ -170,11 +170,11 @@ def score(
 
     Returns:
         A data frame with the index of `pandas_series.to_series` and the columns `value` (of several channels, their names), with a run
-        `enhanced` (of several channels, `enhanced NAME`), `score` (scaled so that the threshold is 1), `flag` (whether the score is above 1), and
-        with a run `out_of_range` (above 1, the coarse run is outside the training range). Samples in parts shorter than a window, or without a
-        run, have NaN in place of scores. `frame.attrs` holds `detector`, `expected_false_alarm_rate`, `events` (the rows of `events_table`),
-        `false_alarms_per_day` (with its 95 % interval, on generated telemetry), `departure` (a sentence, or an empty text) and `counts` (whether
-        the clock counts from zero).
+        `enhanced` (of several channels, `enhanced NAME`), `score` (scaled so that the threshold is 1), `flag` (whether the score is above 1),
+        with a lasting departure `score_after` (scores against the new operating point), and with a run `out_of_range` (above 1, the coarse run
+        is outside the training range). Samples in parts shorter than a window, or without a run, have NaN in place of scores. `frame.attrs` holds
+        `detector`, `expected_false_alarm_rate`, `events` (the rows of `events_table`), `false_alarms_per_day` (with its 95 % interval, on
+        generated telemetry), `departure` (a sentence, or an empty text) and `counts` (whether the clock counts from zero).
 
     Raises:
         InputError: If channels, interval or run do not fit to the simulator, or if every part is shorter than a window.
@@ -205,7 +205,7 @@ def score(
         columns |= dict(zip(names, enhanced.T, strict=True))
     columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
     frame = pd.DataFrame(columns, index=index_of(telemetry_of(telemetry)))
-    departure, nominal = find_departure(simulator, scores, judged), scorer.nominal_scores
+    departure, nominal = find_departure(simulator, scorer.score_series, scores, judged), scorer.nominal_scores
     num_alarms, edges = len(events_of(nominal > 1, gap=scorer.window)), np.cumsum([0, *map(len, telemetry.parts)])
     frame.attrs = {
         "detector": scorer.name,
@@ -216,6 +216,7 @@ def score(
         "departure": "",
     }
     if departure is not None:
+        frame["score_after"] = departure.scores
         frame.attrs["departure"] = _departure_text(frame, departure)
     return frame
 
@@ -259,7 +260,7 @@ def _departure_text(frame: pd.DataFrame, departure: Departure) -> str:
     when = f"{when:.10g} s" if isinstance(when, float) else when
     return (
         f"since {when} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a lasting fault, or "
-        "the new normal: then go on with `update`."
+        "the new normal: then go on with `update`. score_after are scores against the new operating point."
     )
 
 

@@ -80,7 +80,8 @@ def test_a_lasting_change_is_one_event_since_its_time_and_names_update(single, t
     begin = frame.index[event["begin"]]
     assert 1_400 <= event["begin"] <= 1_500 and all(words in frame.attrs["departure"] for words in (f"since {begin}", "level", "`update`"))
     assert begin == pd.Timestamp("2024-01-01T00:00:00Z") + pd.Timedelta(seconds=13_000 + 10 * (event["begin"] - 1_200))
-    assert frame["flag"].iloc[1_600:].mean() > 0.9
+    np.testing.assert_array_equal(frame["score_after"].iloc[:1_200], frame["score"].iloc[:1_200])
+    assert frame["flag"].iloc[1_600:].mean() > 0.9 and (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05  # against the new level
 
 
 def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, telemetry):
@@ -88,6 +89,8 @@ def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, tel
     frame = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), run)
     (event,) = [row for row in frame.attrs["events"] if row["end"] == 3_000]
     assert "level" in frame.attrs["departure"] and 1_400 <= event["begin"] <= 1_500
+    assert frame["score_after"].iloc[:500].isna().all() and (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
+    np.testing.assert_array_equal(frame["score_after"].iloc[:1_400], frame["score"].iloc[:1_400])
 
 
 def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
