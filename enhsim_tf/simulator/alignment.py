@@ -13,7 +13,7 @@ from enhsim_tf.coarse_simulator.pairing import pair_recordings
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, waves_or_level
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.simulator.joint import long_enough, windows_of
+from enhsim_tf.simulator.joint import cut, long_enough, windows_of
 from enhsim_tf.telemetry.windows import num_window_starts
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
@@ -50,6 +50,7 @@ class Waves:
         self.simulators, self.channels = tuple(simulators), tuple(channels)
         self.interval_s, self.window = float(interval_s), int(window)
         self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
+        self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -118,21 +119,16 @@ class Waves:
         for row, scenario in enumerate(scenarios):
             if scenario is not None:
                 rows_of.setdefault(scenario, []).append(row)
-        nominal = self._nominal(self._times(starts))
+        nominal = np.concatenate([self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2)
         changes = [(channel, rows, scenario, 0, self.window) for scenario, rows in rows_of.items() for channel in self._concerned(scenario)]
         return self._degraded(nominal, self._times(starts), changes, rng) if changes else Drawn(nominal, nominal)
 
     def draw_series(self, num_samples: int, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
         """Simulates one coarse series, as a single window of `num_samples`; each event is a mode, its first sample and its end."""
-        times = (self.interval_s * np.arange(num_samples))[None]
-        changes = [
-            (channel, [0], *event) for channel in range(len(self.simulators)) for event in events if channel in self._concerned(event[0])
-        ]
-        return self._degraded(self._nominal(times), times, changes, rng)
-
-    def _nominal(self, times: np.ndarray) -> np.ndarray:
-        """Simulates nominal windows of all channels at times of shape `(windows, samples)`."""
-        return np.stack([self._in_unit(channel, each.simulate(times)) for channel, each in enumerate(self.simulators)], axis=2)
+        times, numbers = (self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
+        nominal = np.stack([self._in_unit(channel, self.simulators[channel].simulate(times)) for channel in numbers], axis=2)
+        changes = [(channel, [0], *event) for channel in numbers for event in events if channel in self._concerned(event[0])]
+        return self._degraded(nominal, times, changes, rng)
 
     def _degraded(
         self, nominal: np.ndarray, times: np.ndarray, changes: Sequence[tuple[int, list[int], Degraded, int, int]], rng: np.random.Generator
@@ -147,6 +143,16 @@ class Waves:
             if stuck is not None:
                 held[rows, begin + stuck[0] : begin + stuck[1], channel], is_stuck = begin + stuck[0], True
         return Drawn(coarse, nominal, held if is_stuck else None)
+
+    def _nominal(self, channel: int, starts: np.ndarray) -> np.ndarray:
+        """Simulates nominal windows of a channel, shape `(windows, samples, 1)`; many are cut out of one series that is kept."""
+        simulator, length = self.simulators[channel], int(starts.max(initial=0)) + self.window
+        if length > len(self._series[channel]):
+            if 2 * len(starts) * self.window < length:
+                return self._in_unit(channel, simulator.simulate(self._times(starts)))[:, :, None]
+            times = self.interval_s * np.arange(1 << length.bit_length())  # the next windows are hardly ever beyond its end
+            self._series[channel] = self._in_unit(channel, simulator.simulate(times[None]))[0][:, None]
+        return cut(self._series[channel : channel + 1], starts, self.window)
 
     def _times(self, starts: np.ndarray) -> np.ndarray:
         return self.interval_s * (starts[:, None] + np.arange(self.window))
