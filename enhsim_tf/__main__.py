@@ -1,10 +1,13 @@
 """`enhsim-tf`, or `python -m enhsim_tf`: telemetry of one's own, from a table to a simulator, training data and scores."""
 
 import importlib
+import os
+import sys
+from typing import NoReturn
 
 from enhsim_tf.cli.arguments import parse
 from enhsim_tf.cli.checks import check
-from enhsim_tf.common.console import exit_process, run_command
+from enhsim_tf.common.console import run_command
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -18,9 +21,18 @@ def main(arguments: list[str] | None = None) -> int:
     return run_command(run, "interrupted; what was finished is kept")
 
 
-def command() -> None:
+def command() -> NoReturn:
     """Runs the command and ends the process with its exit code."""
     exit_process(main())
+
+
+def exit_process(code: int) -> NoReturn:
+    """Ends the process of a command. With Ray loaded beside TensorFlow, it skips the interpreter's shutdown, which sometimes crashes."""
+    if "ray" not in sys.modules:
+        sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ import json
 import os
 import re
 import shutil
-import urllib.parse
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,8 +21,6 @@ import filelock
 from enhsim_tf.common.errors import InputError
 
 _LEFT = re.compile(r"\.(?P<name>.+)\.(?P<kind>[0-9a-f]{8}|old)\.enhsim_tf(\.\w+)?")
-_MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and locks add 50, and most file systems allow 255
-_KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names reserved by Windows
 
 
 def _beside(path: Path, suffix: str = "", kind: str | None = None) -> Path:
@@ -40,29 +37,6 @@ def _locked(path: Path, blocking: bool = True) -> Iterator[None]:
         finally:
             with contextlib.suppress(OSError):
                 os.unlink(lock.lock_file)  # while it is held: filelock notices that the file is another, and tries again
-
-
-def encode_name(name: str) -> str:
-    """Percent-encodes a name, such as a channel's, for use as a file or folder name; `urllib.parse.unquote` restores it.
-
-    The result cannot point outside its folder, is not hidden, and is not a name that Windows reserves.
-
-    Raises:
-        InputError: If the name is empty, too long for a file, or not valid Unicode.
-    """
-    try:
-        found = urllib.parse.quote(name, safe=" ").replace(".", "%2E")
-    except UnicodeEncodeError:
-        raise InputError(f"Expected a channel name of Unicode characters. Received: {name[:60]!r}. Rename it.") from None
-    found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # Windows strips them
-    if _KEPT.fullmatch(found):
-        found = f"%{ord(found[0]):02X}{found[1:]}"
-    if not 1 <= len(found) <= _MAX_CHARACTERS:
-        raise InputError(
-            f"Expected a channel name of 1 to {_MAX_CHARACTERS} letters (signs and letters beyond ASCII count for three or more). "
-            f"Received: {name[:60]!r} with {len(found)}. Rename it, or name the other channels."
-        )
-    return found
 
 
 def make_folder(path: str | os.PathLike) -> Path:

@@ -93,12 +93,3 @@ def run_command(run: Callable[[], int], interrupted: str) -> int:
     except KeyboardInterrupt:
         print(interrupted, file=sys.stderr)
         return 130
-
-
-def exit_process(code: int) -> NoReturn:
-    """Ends the process of a command. With Ray loaded beside TensorFlow, it skips the interpreter's shutdown, which sometimes crashes."""
-    if "ray" not in sys.modules:
-        sys.exit(code)
-    for stream in (sys.stdout, sys.stderr):
-        stream.flush()
-    os._exit(code)

@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import matplotlib.figure
@@ -42,7 +42,6 @@ def save(
     folder: str | os.PathLike,
     caption: str,
     is_smoke: bool,
-    saved_as: Sequence[str] = ("png", "svg"),
     *,
     figures: Mapping[str, Figure],
 ) -> list[Path]:
@@ -54,7 +53,6 @@ def save(
         folder: An existing folder.
         caption: Caption line, printed at the bottom.
         is_smoke: Whether the arrays come from a smoke run, which a watermark then says.
-        saved_as: File types.
         figures: The figures by name.
 
     Returns:
@@ -68,7 +66,7 @@ def save(
     if is_smoke:
         mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
         figure.text(0.5, 0.5, "SMOKE BUDGET", **mark, ha="center", va="center", zorder=10, gid="watermark")
-    paths = [Path(folder) / f"{name}.{kind}" for kind in saved_as]
+    paths = [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg")]
     with matplotlib.style.context(STYLE):
         for path in paths:
             undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}

@@ -26,20 +26,11 @@ def boosted_trees(generated_features: np.ndarray, real_features: np.ndarray, see
     """
     from sklearn.ensemble import HistGradientBoostingClassifier
 
-    return _held_out_auc(HistGradientBoostingClassifier(random_state=seed), "predict_proba", generated_features, real_features)
+    return held_out_auc(HistGradientBoostingClassifier(random_state=seed), "predict_proba", generated_features, real_features)
 
 
-def linear_classifier(generated_features: np.ndarray, real_features: np.ndarray) -> float:
-    """The same as `boosted_trees` with a ridge classifier on standardised features, intended for many features."""
-    from sklearn.linear_model import RidgeClassifier
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-
-    classifier = make_pipeline(StandardScaler(), RidgeClassifier(alpha=100.0))
-    return _held_out_auc(classifier, "decision_function", generated_features, real_features)
-
-
-def _held_out_auc(classifier: Any, method: str, generated_features: np.ndarray, real_features: np.ndarray) -> float:
+def held_out_auc(classifier: Any, method: str, generated_features: np.ndarray, real_features: np.ndarray) -> float:
+    """The same as `boosted_trees` for a classifier of scikit-learn and the method that gives its scores."""
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import cross_val_predict
     from threadpoolctl import threadpool_limits

@@ -5,6 +5,7 @@ numbers is an array. No code is saved.
 """
 
 import os
+import re
 import urllib.parse
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.common.atomic_files import encode_name, replace_folder, sha256, write_json
+from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json, short_reason
 
@@ -20,8 +21,33 @@ MANIFEST, _SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
 _MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
 _MOST_ARRAYS = 2**28  # maximum bytes of all arrays; the weights of the paper's network are 55 MB
 _MOST_NAME = 60  # bytes of the name of a folder
+_MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and locks add 50, and most file systems allow 255
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names of Windows
 _NUMBER = "3"  # of the format
 _FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
+
+
+def encode_name(name: str) -> str:
+    """Percent-encodes a name, such as a channel's, for use as a file or folder name; `urllib.parse.unquote` restores it.
+
+    The result cannot point outside its folder, is not hidden, and is not a name that Windows reserves.
+
+    Raises:
+        InputError: If the name is empty, too long for a file, or not valid Unicode.
+    """
+    try:
+        found = urllib.parse.quote(name, safe=" ").replace(".", "%2E")
+    except UnicodeEncodeError:
+        raise InputError(f"Expected a channel name of Unicode characters. Received: {name[:60]!r}. Rename it.") from None
+    found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # Windows strips them
+    if _RESERVED.fullmatch(found):
+        found = f"%{ord(found[0]):02X}{found[1:]}"
+    if not 1 <= len(found) <= _MAX_CHARACTERS:
+        raise InputError(
+            f"Expected a channel name of 1 to {_MAX_CHARACTERS} letters (signs and letters beyond ASCII count for three or more). "
+            f"Received: {name[:60]!r} with {len(found)}. Rename it, or name the other channels."
+        )
+    return found
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:

@@ -541,7 +541,7 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
 def test_a_process_that_used_ray_exits_at_once_and_flushes_its_output(module, said):
     program = (
         f"import atexit, sys, types; sys.modules[{module!r}] = types.ModuleType({module!r})\n"
-        "from enhsim_tf.common.console import exit_process\n"
+        "from enhsim_tf.__main__ import exit_process\n"
         "atexit.register(lambda: print(', and more', end=''))\n"
         "print('said', end=''); exit_process(3)"
     )

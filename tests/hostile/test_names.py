@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.__main__ import main
-from enhsim_tf.common.atomic_files import encode_name
-from enhsim_tf.simulator.model_folder import folder_of, models_of
+from enhsim_tf.simulator.model_folder import encode_name, folder_of, models_of
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.sources import read_source
 from tests.hostile.folders import settings_for, write_model
