@@ -87,7 +87,7 @@ def show(pipeline: Pipeline, name: str) -> None:
     is_smoke = pipeline.settings.iterations < make_settings().iterations
     caption = f"seed {pipeline.settings.seed} · python -m enhsim_tf.reproduce --only {name.split('_')[0]}"
     with tempfile.TemporaryDirectory() as folder:
-        (path,) = figure.save(name, pipeline, folder, caption, is_smoke, ("png",), figures=FIGURES)
+        path, _ = figure.save(name, pipeline, folder, caption, is_smoke, figures=FIGURES)
         _show_picture(path.read_bytes(), FIGURES[name].alt)
 
 

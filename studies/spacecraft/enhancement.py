@@ -30,9 +30,9 @@ def error_rows(simulator: "EnhancedSimulator", ridge: "EnhancedSimulator", chann
     begins = window * np.arange(len(channel.test) // window)
     begins = begins[~windows_that_meet(begins, window, channel.sequences).any(axis=0)]
     targets = cut_windows(channel.test.values, begins, window)[:, :, None]
-    square = _waves(simulator, False).align(targets)
+    coarse, shift, gain = _waves(simulator, False).align(targets)
     estimates = {
-        "coarse": square.shift[:, None] + square.gain[:, None] * square.coarse,
+        "coarse": shift[:, None] + gain[:, None] * coarse,
         "ridge": ridge.enhance(*_waves(ridge, True).align(targets)),
         "enhanced": simulator.enhance(*_waves(simulator, True).align(targets)),
     }
