@@ -4,7 +4,7 @@
 # **Question:** can data from a crude simulator, made realistic by two neural networks, train a detector?
 #
 # - **After this lesson** you can explain each step of the paper, and say where the method fails.
-# - **You should know** what a Dense layer is.
+# - **You should know** what a Dense layer and principal components are.
 # - **Terms:** *telemetry*: the measurements that a vehicle sends. *Window*: here 500 samples in a row. *Nominal*: without a fault. A
 #   *detector* learns from nominal data, scores new windows, and raises an alarm above a threshold. All terms:
 #   [glossary](../docs/glossary.md).
@@ -81,8 +81,8 @@ assert len(levels) == 4
 show(pipeline, "fig04_enhanced_simulation")
 
 # %% [markdown]
-# *What to see:* the error is a fraction of the simulator's own. The enhanced signal is rougher than the truth;
-# [04](04_enhanced_simulation.ipynb) looks for the reason.
+# *What to see:* the error is a fraction of the simulator's own. The enhanced signal is rougher than the truth
+# ([04](04_enhanced_simulation.ipynb)).
 
 # %%
 errors = measured("enhancement", pipeline)
@@ -120,7 +120,8 @@ assert abs(extracted / true - 1) < 0.03
 # ## Steps 7 to 9: two networks play against each other
 #
 # A *generator* turns 16 random numbers into 500 samples ([09](09_generator.ipynb)). A *discriminator* says which noise is real
-# ([10](10_discriminator.ipynb)). Each learns from the other, a thousand times ([11](11_gan_training.ipynb)).
+# ([10](10_discriminator.ipynb)). Together they are a *GAN*, a generative adversarial network. Each learns from the other, a thousand times
+# ([11](11_gan_training.ipynb)).
 
 # %%
 show(pipeline, "fig12_accuracy_loss")
@@ -142,7 +143,7 @@ if budget == "full":
     assert np.all(np.abs(losses - np.log(2)) < 0.15)
 
 # %% [markdown]
-# At a glance, the noise is similar. But generated windows share a pattern. A thousand of them vary in few dimensions, which the
+# But generated windows share a pattern. A thousand of them vary in few dimensions, which the
 # *effective rank* counts ([05](05_real_or_generated.ipynb)):
 
 # %%
@@ -223,6 +224,7 @@ assert budget == "smoke" or alarms["combined"] > 0.9 > 0.1 > alarms["telemetry"]
 # The next figure has two more detectors, more data, and faults to be found.
 #
 # - *Dense autoencoder*: the error with which a network reproduces a window from a few numbers.
+# - *Gaussian noise*: independent normal numbers with the standard deviation of the extracted noise.
 # - *Isolation forest*: how few random cuts separate a window's features from those of training windows.
 
 # %%

@@ -8,7 +8,7 @@
 # - **You should know** sines, mean and variance.
 # - **Terms:** [coarse simulator](../docs/glossary.md#coarse-simulator), [window](../docs/glossary.md#window);
 #   *enhancer*: the network that turns the square waves into a waveform (notebook 03);
-#   [NRMSE](../docs/glossary.md#nrmse): $\sqrt{\mathrm{mean}(\hat x-x)^2}\,/\,\mathrm{sd}(x)$ for an estimate $\hat x$ of a signal $x$.
+#   [NRMSE](../docs/glossary.md#nrmse): $\sqrt{\mathrm{mean}[(\hat x-x)^2]}\,/\,\mathrm{sd}(x)$ for an estimate $\hat x$ of a signal $x$.
 #
 # **What the paper says** (sections 1, 2 and 2.1): a coarse simulation is enough to start from, since "a square wave can be used for
 # nearly any periodic waveform". The signals are sines with periods of 8 and 2 minutes. Figure 2 shows the coarse source and the target
@@ -109,7 +109,7 @@ with drawing(alt, 2, 2.1, title) as panels:
 
 # %% [markdown]
 # *What to see:* the error has its minimum where the height is the mean of the sine over half a period, $2/\pi$. An enhancer that can
-# rescale its input need not care about the height: *when* the levels switch is what the simulation knows.
+# rescale its input need not care about the height: *when* the levels switch is what matters.
 
 # %%
 say(f"The error on the right is smallest at a height of **{heights[np.argmin(by_height)]:.2f}**.")
@@ -131,8 +131,8 @@ assert distinct == 480
 # However much telemetry is recorded, the enhancer only ever sees these inputs. "Held out" in this example means other noise and other
 # times, not other inputs. A real channel, whose period is no whole number of samples, may be harder.
 #
-# **Answer.** The simulator knows *when* each of the two sines changes its sign, and nothing of their shape: its error is 0.67 standard
-# deviations of the signal.
+# **Answer.** The simulator knows *when* each of the two sines changes its sign and how high it rises, and nothing of what lies between: its
+# error is 0.67 standard deviations of the signal.
 #
 # ## Exercises
 #
@@ -157,7 +157,9 @@ check_answer(
 
 
 # %%
-def num_distinct(orbit_s, rotation_s): ...  # your code: an argument in whole numbers, or a count as above
+def num_distinct(
+    orbit_s, rotation_s
+): ...  # your code: an argument in whole numbers, or a count as above over 200,000 samples
 
 
 # %%

@@ -136,14 +136,14 @@ say(
 assert correlation["generated"] > {"full": 0.3, "smoke": 0.1}[budget] > abs(correlation["real"])
 
 # %% [markdown]
-# In how many dimensions do many windows vary? The *effective rank* counts them:
+# In how many dimensions do many windows vary? The *effective rank* counts them ([09](09_generator.ipynb) writes it in four lines):
 
 # %%
 found = measured("noise resemblance", pipeline)
 rank_generated, rank_real = found["rank"], found["real_rank"]
 say(
-    f"Effective rank of {len(pipeline.noise_windows('test')):,} windows: **{rank_generated:.0f}** generated, **{rank_real:.0f}** real, "
-    f"a share of {rank_generated / rank_real:.0%}."
+    f"Effective rank of {len(pipeline.noise_windows('test')):,} windows: **{rank_generated:.1f}** generated, **{rank_real:.0f}** real, "
+    f"a share of {rank_generated / rank_real:.1%}."
 )
 assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[budget]
 

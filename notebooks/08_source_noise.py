@@ -132,8 +132,8 @@ slider(draw, "width", range(3, 242, 2), shown=(25, 3, 121), unit="samples")
 
 # %% [markdown]
 # *What to see:* a narrow average follows the noise itself and removes it. A wide one no longer follows the 2-minute wave, which then is
-# called noise. A good width is therefore long against the memory of the noise and short against the fastest signal. The formula says the
-# same for all widths:
+# called noise. A good width is therefore short against the fastest signal, and so long that $1/w$ is small. (Noise with a memory: exercise
+# 2.) The formula says the same for all widths:
 
 # %%
 widths = np.arange(3, 122, 2)
@@ -188,7 +188,7 @@ say(f"Lag 1: **{measured[0]:.3f}** measured, **{closed_form[0]:.3f}** computed."
 assert np.abs(measured - closed_form).max() < 0.01
 
 # %% [markdown]
-# **Answer.** Subtract a moving average whose width is long against the memory of the noise and short against the fastest signal. What is
+# **Answer.** Subtract a moving average that is many samples wide, but short against the fastest signal. What is
 # left has nearly the right standard deviation, but 7 % of the 2-minute wave stay in it, and near samples become negatively correlated.
 #
 # ## Exercises

@@ -141,7 +141,7 @@ shares = {name: shares_of_variance(windows) for name, windows in parts.items()}
 
 # %%
 alt = "Share of the variance by dimension, sorted: real noise, generated noise, and the same before the tanh"
-title = "Generated noise fills 64 dimensions before the tanh, real noise all 500"
+title = "Generated noise fills 64 dimensions before the tanh, real noise nearly all"
 styles = ((REAL, "-"), (GENERATED, DASHED), (GENERATED, ":"))
 with drawing(alt, height=2.3, title=title) as panel:
     for (name, values), (color, style) in zip(shares.items(), styles):
@@ -204,8 +204,8 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** Which change raises the effective rank of an untrained generator more: 256 latent numbers instead of 16, or 512 hidden neurons
-# instead of 64? Complete the function, and compare.
+# **2.** Is one of two changes enough to come near the rank of real noise: 256 latent numbers instead of 16, or 512 hidden neurons instead
+# of 64? Complete the function, and compare.
 
 
 # %%
@@ -266,7 +266,7 @@ check_answer(
 #     print(sizes, f"effective rank {rank_of_untrained(*sizes):.0f}")
 # ```
 #
-# Both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it. Compare
-# the numbers with the rank of real noise above. Training then decides how much of its rank a generator uses.
+# No: both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it.
+# Compare the numbers with the rank of real noise above. Training then decides how much of its rank a generator uses.
 #
 # </details>

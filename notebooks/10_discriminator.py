@@ -161,7 +161,7 @@ judged = {name: probability_real(windows) for name, windows in changed.items()}
 
 # %%
 alt = "Judgement of real windows as recorded and after each of three changes: points near the diagonal are windows judged alike"
-title = "While pieces stay whole, the discriminator judges a window almost as before"
+title = "The discriminator overlooks the order of blocks, and notices size"
 with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
     for panel, (name, other) in zip(panels, judged.items()):
         panel.plot(recorded, other, "o", color=REAL, markersize=2, alpha=0.4)

@@ -6,8 +6,8 @@
 # - **After this lesson** you can write the whole training loop of a GAN in plain Keras, say which weights each step moves, and watch the
 #   noise form.
 # - **You should know** the generator (notebook 09) and the discriminator (notebook 10).
-# - **Terms:** GAN: *generative adversarial network*; [adversarial loss](../docs/glossary.md#adversarial-loss). *Freezing* a network
-#   means that a step uses its weights without changing them.
+# - **Terms:** GAN: *generative adversarial network*; *tags*: the paper's word for labels;
+#   [adversarial loss](../docs/glossary.md#adversarial-loss). *Freezing* a network means that a step uses its weights without changing them.
 #
 # **What the paper says** (section 2.3): two phases an iteration. The discriminator learns from a batch of 200 rows, half of them real ones
 # tagged 1.0 and half generated ones tagged 0.0. Then its weights are frozen, "the tags for this pass are reversed, and the discriminator

@@ -68,7 +68,7 @@ if budget == "full":  # twenty iterations give noise of the wrong size
 # What counts in the end is whether a detector can be trained on the sum. A simple one is the *PCA residual*. It learns the 20
 # main directions $V$ in which nominal windows vary, and scores a window by what lies outside of them:
 #
-# $$s(x)=\mathrm{mean}\left((I-VV^\mathsf{T})(x-\bar x)\right)^2$$
+# $$s(x)=\mathrm{mean}\left[\left((I-VV^\mathsf{T})(x-\bar x)\right)^2\right]$$
 
 
 # %%
@@ -168,8 +168,9 @@ with drawing(alt, height=1.9, title=title) as panel:
 # %% [markdown]
 # *What to see:* the detector that was trained on the paper's sum is as useless as the one that was trained without noise, although a plot
 # shows hardly any difference to telemetry. After Gaussian noise of the same standard deviation, which takes one line, it alarms about as
-# seldom as after real data, and finds the drift about as often. After *coarse* it alarms never, because its threshold lies above the scores
-# of all real windows. (Rates differ a little between notebooks, which draw other windows.)
+# seldom as after real data, and both find the drift in every window, so that a smaller one would be needed to compare them. After *coarse*
+# it alarms never, because its threshold lies above the scores of all real windows. (Rates differ a little between notebooks, which draw
+# other windows.)
 
 # %%
 say("False alarms: " + ", ".join(f"{kind} **{rate:.1%}**" for kind, rate in rates.items()) + ".")
@@ -256,7 +257,7 @@ assert budget == "smoke" or (share[0.9] > 0.5 and share[1.0] < 0.05 and share[1.
 
 # %% [markdown]
 # **Answer.** Not with the paper's noise: a detector that looks outside the main directions then alarms on every nominal window. With
-# Gaussian noise of the right size, it alarms about as seldom, and finds a drift about as often, as after real data.
+# Gaussian noise of the right size, it alarms about as seldom as after real data, and still finds every drift of this size.
 #
 # ## Exercises
 #

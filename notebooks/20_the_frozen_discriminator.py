@@ -210,8 +210,8 @@ print(f"named weights {named_first:.2f}, {named_last:.2f}")
 assert classic_last > classic_first and named_last < named_first / 2
 
 # %% [markdown]
-# **Answer.** Keras 3 reads `trainable` when the training step is built, which is after the freeze. Nobody notices, because the loss moves
-# all the same: the generator learns.
+# **Answer.** Keras 3 reads `trainable` when the training step is built, which is after the freeze. It is easy to miss: there is one
+# warning, and the loss moves all the same, because the generator learns.
 #
 # ## Exercises
 #

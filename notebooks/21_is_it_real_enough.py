@@ -77,9 +77,9 @@ with drawing(alt, 2, 2.5, title) as (left, right):
     left.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the histograms nearly lie on top of each other, and the GAN's spectrum scatters about the level of the others. Only the
-# real noise has a peak at one cycle in 120 s, a trace of the satellite's 2-minute rotation that the moving average let through (notebook
-# 08).
+# *What to see:* the histograms nearly lie on top of each other, and above 0.03 Hz the GAN's spectrum scatters about the level of the
+# others. Below, real noise has hardly any power: its moving average took that away. Only the real noise has a peak at one cycle in 120 s, a
+# trace of the satellite's 2-minute rotation that the moving average let through (notebook 08).
 
 # %%
 spike = np.argmin(np.abs(frequency - 1 / 120))
@@ -238,8 +238,8 @@ assert record["verdict"] != "reproduced"
 # %% [markdown]
 # **Answer.** The standard deviation and the histogram hardly notice. The mean over windows, the effective rank, a trained classifier and
 # the PCA residual do. They look at how windows differ from each other, or learn what to look at. In the numbers printed above, independent
-# Gaussian numbers come near to real noise, except in the spectrum. But they have an easy time: white noise was put in. For noise with
-# structure that a Gaussian cannot have, the question is open again.
+# Gaussian numbers come near to real noise, except in the spectrum and the lag-1 correlation, in which they would fail C6, too. But they
+# have an easy time: white noise was put in. For noise with structure that a Gaussian cannot have, the question is open again.
 #
 # ## Exercises
 #

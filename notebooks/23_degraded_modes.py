@@ -28,7 +28,8 @@ claim("C9")
 # ## One window in three modes
 #
 # A *mode* says what is wrong, and a severity from 0 to 1 how much. The coarse simulator and the true vehicle take the same mode with the
-# same draws. Both are functions of time, so a mechanism that is *stuck* is one whose time stands still. A *drift* adds a ramp.
+# same draws. Both are functions of time, so a mechanism that is *stuck* is one whose time stands still. A *drift* adds a ramp to both
+# signals from the onset on; the package has it, and four more.
 
 
 # %%
@@ -203,7 +204,7 @@ table["coarse simulator"] = [mean_error(lambda windows: windows, severity) for s
 
 # %%
 alt = "Error on faults, mean over six modes, by severity: coarse, network, ridge, and ridge trained on faults"
-title = "Trained on simulated faults, ridge regression stays below the coarse simulator"
+title = "Trained on faults, ridge regression stays below the coarse simulator on average"
 styles = {"coarse simulator": (COARSE, "-"), "network, nominal": (ENHANCED, "-")}
 styles |= {"ridge, nominal": (QUIET, DASHED), "ridge, nominal and faults": (REAL, ":")}
 with drawing(alt, height=2.4, title=title) as panel:
@@ -218,7 +219,8 @@ with drawing(alt, height=2.4, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the two enhancers that know nominal windows alone become worse than the coarse signal at high severity. The one that was
-# shown faults stays below, also beyond the severities that it was shown.
+# shown faults stays below, also beyond the severities that it was shown. (Means over six modes; with dropout, the next figure shows it
+# above.)
 
 # %%
 print(pd.DataFrame(table, index=pd.Index(severities, name="severity")).T.round(2).to_string())

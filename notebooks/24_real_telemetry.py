@@ -149,6 +149,7 @@ simulator, _ = fit(telemetry, options=options)
 # The best phase is the one with $b>0$ and the smallest sum of squares of the *rest*, $x_t-a-b\,g_{pt}$: the residual after alignment.
 
 # %%
+# the square wave that fit has estimated from the telemetry: a period and two levels
 (square_wave,) = simulator.alignment.simulators
 (wave,) = square_wave.waves
 phases = wave.period_s * np.arange(400) / 400

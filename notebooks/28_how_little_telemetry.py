@@ -147,7 +147,8 @@ with drawing(alt, height=2.1, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the threshold from the training windows is useless. The twenty components describe a part of the noise of these very
-# windows, and of no others. Cross-fitting comes much nearer to the 1 % that was asked for, but with five windows it is still above it.
+# windows, and of no others. Cross-fitting comes much nearer to the 1 % that was asked for, but with five and with twenty windows it is
+# still above it.
 
 # %%
 print(rates.rename_axis("k").round(4).to_string())

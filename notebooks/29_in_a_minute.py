@@ -12,7 +12,8 @@
 #   residual](../docs/glossary.md#pca-residual): what the main directions of the training windows leave of a window.
 #
 # **What the paper says** (section 2): windows of 500 samples, hidden layers of 3,200 neurons, 40 epochs and about 1,000 iterations. Here
-# everything is smaller. The same code runs, and nothing is taken from a cache.
+# everything is smaller. The same code runs, and nothing is taken from a cache. (*Filters* are those of the discriminator's convolution,
+# *rows* the windows in a batch of the GAN, and *rounds* how many times the iterations its training is followed.)
 
 # %%
 import json

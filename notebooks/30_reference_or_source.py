@@ -233,7 +233,7 @@ assert of_aircraft["reference"] - of_aircraft["no simulator"] < 0.1
 assert min(of_battery.values()) > 0.03
 
 # %% [markdown]
-# **Answer.** As a reference, where the simulator is near enough to the vehicle, as on the battery. As a source it adds little to what the
+# **Answer.** As a reference, on the battery. As a source it adds little to what the
 # telemetry alone finds. On the aircraft, neither helps much, and the enhanced run finds hardly more than the coarse one. With the fewest
 # known windows, no use keeps to 1 % of false alarms on the battery.
 #
