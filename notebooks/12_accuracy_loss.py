@@ -156,8 +156,7 @@ records = verdict(pipeline, "C4", "C5")
 assert [record["id"] for record in records] == ["C4", "C5"]
 
 # %% [markdown]
-# *What to see:* C5 holds: in the second half of training, about half of all rows are classified correctly. C4 does not: the noise settles
-# later than its limit.
+# In this run, the two stay balanced (C5), but the noise settles later than its limit (C4).
 #
 # **Answer.** Little. It shows that *this* discriminator is right no more often than a coin (after 1,000 iterations, its AUC is 0.49, too:
 # notebook 10), and not that the noises are alike: the generated noise has less than a tenth of the real effective rank.
