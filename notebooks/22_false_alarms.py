@@ -300,7 +300,7 @@ factor_of_threshold = None  # your answer
 # %%
 check_answer(
     factor_of_threshold,
-    lambda answer: (1.13 if is_full else 1.0) < answer < (1.25 if is_full else 1.6),
+    lambda answer: not is_full or 1.13 < answer < 1.25,
     "A score is a mean of squares.",
 )
 
