@@ -35,8 +35,8 @@ def pytest_addoption(parser):
 def pytest_collection_modifyitems(config, items):
     """Leaves the slow tests out, unless they are asked for, and gives each file or folder to one process."""
     if not config.getoption(SLOW):
-        left = [item for item in items if item.get_closest_marker("slow")]
-        config.hook.pytest_deselected(items=left)
+        left = {item for item in items if item.get_closest_marker("slow")}
+        config.hook.pytest_deselected(items=list(left))
         items[:] = [item for item in items if item not in left]
         config.stash[LEFT] = len(left)
         if hasattr(config, "workeroutput"):  # a process of xdist, which tells the first one

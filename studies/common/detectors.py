@@ -133,9 +133,9 @@ class ConvolutionalAutoencoder(_Autoencoder):
         )
 
     def _reconstruct(self, scaled: np.ndarray) -> np.ndarray:
-        from enhsim_tf.common.training import predict_windows
+        from enhsim_tf.paper.enhancer import predict
 
-        return predict_windows(self._network, scaled, 1_024)
+        return predict(self._network, scaled)
 
 
 DETECTORS: dict[str, Callable[[int], Any]] = {

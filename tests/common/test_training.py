@@ -4,7 +4,8 @@ import keras
 import numpy as np
 import pytest
 
-from enhsim_tf.common.training import dense_stack, fit_windows, predict_windows
+from enhsim_tf.common.training import dense_stack, fit_windows
+from enhsim_tf.paper.enhancer import predict
 
 
 def windows(number, samples=20, seed=0):
@@ -26,7 +27,7 @@ def test_a_dense_stack_is_relu_layers_and_a_linear_one():
     for number, layer in enumerate(model.layers):
         expected = expected @ np.asarray(layer.kernel) + np.asarray(layer.bias)
         expected = np.maximum(expected, 0) if number < 3 else expected
-    enhanced = predict_windows(model, coarse, batch_size=128)
+    enhanced = predict(model, coarse, batch_size=128)
     assert enhanced.dtype == np.float32
     np.testing.assert_allclose(enhanced, expected, rtol=1e-4, atol=1e-4)
 
@@ -43,9 +44,9 @@ def test_known_linear_map_is_learnt_to_a_known_error():
     source, _, target = pairs(3_000, 2)
     held_out, clean, noisy = pairs(1_000, 3)
     model = small()
-    untrained = np.mean((predict_windows(model, held_out, 1_024) - noisy) ** 2)
+    untrained = np.mean((predict(model, held_out) - noisy) ** 2)
     losses = fit_windows(model, source, target, 15, 50, seed=0)
-    enhanced = predict_windows(model, held_out, 1_024)
+    enhanced = predict(model, held_out)
     error = np.mean((enhanced - noisy) ** 2)
     assert untrained > np.var(clean) > 5 * noise_sd**2  # the untrained error is far above the noise
     assert error == pytest.approx(np.mean((noisy - clean) ** 2), rel=0.1)

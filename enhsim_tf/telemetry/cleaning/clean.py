@@ -12,11 +12,12 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
+from enhsim_tf.telemetry.cleaning.options import UNITS_NS
 from enhsim_tf.telemetry.cleaning.options import Cleaning as Cleaning
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
 from enhsim_tf.telemetry.cleaning.regular_grid import Rows, regularise
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, finding_from_dict, iso_time
-from enhsim_tf.telemetry.cleaning.times import UNITS_NS, localize_times, parse_times, refuse_repeated_local_hour
+from enhsim_tf.telemetry.cleaning.times import localize_times, parse_times, refuse_repeated_local_hour
 from enhsim_tf.telemetry.series import Telemetry
 
 

@@ -13,7 +13,9 @@ _CHOICES = {
     "labelled": ("keep", "missing"),
     "decimal": (None, ".", ","),
 }
-_TIME_UNITS = "D h min s ms us ns excel mjd jd datenum".split()  # the keys of `times.UNITS_NS` and `times.DAYS`, whose import is slow
+UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_529.0}
+"""Kinds of days and their number of 1970-01-01: spreadsheets, modified Julian dates, Julian dates, MATLAB."""
 _MAX_FILL = {"linear": 5, "hold": 1_000_000}
 _NAMES = ("label_column", "series_column", "value_column")
 
@@ -78,10 +80,11 @@ class Cleaning:
             raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
         if not (0 <= self.max_jitter <= 0.5 and self.longest_gap >= 0 and self.min_part >= 1):
             raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
-        if self.time_format is not None and self.time_format not in _TIME_UNITS and "%" not in self.time_format:
+        form, units = self.time_format, (*UNITS_NS, *DAYS)
+        if form is not None and form not in units and "%" not in form:
             raise InputError(
                 "Expected time_format as datetime.strptime takes it, such as '%d.%m.%Y %H:%M:%S', or one of: "
-                f"{', '.join(_TIME_UNITS)}. Received: time_format={self.time_format!r}."
+                f"{', '.join(units)}. Received: time_format={form!r}."
             )
         for name in _NAMES:
             given = getattr(self, name)

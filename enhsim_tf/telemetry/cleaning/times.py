@@ -15,12 +15,10 @@ from pandas.tseries.api import guess_datetime_format
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import as_column, format_cell, is_missing, is_text, parse_numbers
+from enhsim_tf.telemetry.cleaning.options import DAYS, UNITS_NS
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Places
 
-UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_NAMES = {"D": "days", "h": "hours", "min": "minutes", "s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
-DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_529.0}
-"""Kinds of days and their number of 1970-01-01: spreadsheets, modified Julian dates, Julian dates, MATLAB."""
 _DAY_NAMES = {"excel": "days of spreadsheets", "mjd": "modified Julian dates", "jd": "Julian dates", "datenum": "MATLAB's day numbers"}
 _YEARS_S = (3.1e8, 4.2e9)  # seconds since 1970 in the years 1979 to 2103
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262

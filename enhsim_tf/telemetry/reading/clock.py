@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import UNITS_NS, Times, epoch_unit, refuse_days
+from enhsim_tf.telemetry.cleaning.options import UNITS_NS
+from enhsim_tf.telemetry.cleaning.times import Times, epoch_unit, refuse_days
 
 NO_TIME = "none"  # instead of the name of a time column: the table has no times, and samples are counted
 _TIMES = set(
