@@ -27,8 +27,8 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     """False alarms by training data, a kind of noise a panel."""
     figure, down = new_sheet(
         DOUBLE,
-        4.6,
-        "Only noise that is drawn from telemetry keeps false alarms low",
+        1.3 + 1.7 * -(-len(found["environments"]) // 2),
+        "Of simulated training data, only residual windows keep false alarms low",
         "False alarms on real nominal windows. Simulators without noise (grey), the paper's pipeline (orange), ridge and residual windows (blue), "
         "real telemetry (black). Large mark, bar: mean of seven detectors, 95 % interval. Small marks: detectors, at least 0.02 %.",
     )
@@ -81,14 +81,13 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     )
     curves = found["modes"]["by_mode"]
     modes = [mode for mode in curves["paper"] if mode != "nominal"]
-    grid = panels(figure, down + 0.22, 2, 3, right=1.2, gap=(0.42, 0.36), sharex=True)
+    grid = panels(figure, down + 0.22, 2, 3, right=1.2, gap=(0.42, 0.2), sharex=True, sharey=True)
     for axes, mode in zip(grid.ravel(), modes, strict=True):
         axes.axvspan(0, LARGEST_TRAINED, color=GREY_TINT, zorder=0)
         for method, (colour, style, _) in _METHODS.items():
             axes.plot(*np.transpose(curves[method]["nominal"] + curves[method][mode]), style, color=colour)
         axes.set_title(mode.replace("_", " "))
         axes.set_ylim(0, None)
-        axes.yaxis.set_major_formatter("{x:g}")
         axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     last = modes[2]
     label_ends(grid[0, -1], {label: ([curves[method][last][-1][1]], colour) for method, (colour, _, label) in _METHODS.items()})

@@ -20,8 +20,8 @@ def reference_or_source(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         1.5 + 0.19 * len(names),
-        "Detectors on real spacecraft channels: simulator as reference and as source",
-        "Mean and 95 % interval over channels and training seeds. Squares: residual of the aligned simulator. Diamonds: no simulator. "
+        "References rank anomalies best, with wide intervals",
+        "Six spacecraft channels. Mean and 95 % interval over channels and seeds. Squares: residual of the aligned simulator. Diamonds: no simulator. "
         "Circles: mean of seven detectors, by their training data (black: real telemetry).",
     )
     grid = panels(figure, down + 0.1, 1, 2, sharey=True)
@@ -50,8 +50,8 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         SINGLE,
         1.9 + 0.2 * len(channels),
-        "Enhancers on channels of a real spacecraft",
-        "Median error of nominal test windows, after phase, offset and gain are aligned.",
+        "Both enhancers beat the square wave",
+        "Spacecraft channels: median error of nominal test windows, aligned in phase, offset and gain.",
     )
     axes = panels(figure, down + 0.3, 1, 1)[0, 0]
     marks = (("coarse", "s", COARSE, 0.0), ("enhanced", "o", ENHANCED, 0.12), ("ridge", "^", AVERAGE, -0.12))
