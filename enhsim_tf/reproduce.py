@@ -146,7 +146,7 @@ def run(options: argparse.Namespace) -> int:
     found = results(records, title(records), settings, published, **about)
     write_json(folder / "results.json", found)
     tell(f"\n{as_text(found['box'])}\n")
-    tell(f"published {published['title']}   this run {found['title']}   {about['seconds']:.0f} s")
+    tell(f"published {published['title']} (in brackets: runs reproduced/partly/not)   this run {found['title']}   {about['seconds']:.0f} s")
     tell(f"figures, results.json and the whole run on one page: {write_page(folder, found, settings)}")
     return conclude(options, outside(records, published))
 

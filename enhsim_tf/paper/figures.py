@@ -206,9 +206,9 @@ def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
         f"Standard deviation of the noise in this window: {np.std(noise):.3f}.",
     )
     above, below = panels(figure, down + 0.2, 2, 1, sharex=True)[:, 0]
-    above.plot(window["minutes"][: len(shown)], shown, color=COARSE, linewidth=0.5)
+    above.plot(window["minutes"][: len(shown)], shown, color=REAL, linewidth=0.5)
     above.plot(window["minutes"][: len(average)], average, color=AVERAGE, linewidth=1.4)
-    title_words(above, (("telemetry", COARSE), ("moving average", AVERAGE)))
+    title_words(above, (("telemetry", REAL), ("moving average", AVERAGE)))
     below.plot(window["minutes"][: len(noise)], noise, color=REAL, linewidth=0.5)
     title_words(below, (("noise", REAL),))
     name_axes(np.array([[above], [below]]), FACTS)
@@ -242,8 +242,12 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Accuracy and loss of the discriminator on real and on generated rows over the iterations, beside chance."""
     history, last = pipeline.history, pipeline.settings.iterations
     chosen = history["iteration"] <= last
+    share = np.mean([history[f"accuracy_{name}"][chosen] for name in ("real", "generated")])
     figure, down = new_sheet(
-        DOUBLE, 2.7, "Accuracy and loss compare the discriminator with chance", "On real and generated rows, drawn anew. Dotted: chance."
+        DOUBLE,
+        2.7,
+        f"The discriminator classifies {share:.0%} of all rows correctly",
+        "Mean over the iterations shown and both kinds of rows, drawn anew. Dotted: chance.",
     )
     axes = panels(figure, down + 0.2, 1, 2, right=0.8, gap=(0.24, 1.25))[0]
     for panel, key, chance, words in (

@@ -27,9 +27,9 @@ _KINDS |= {words: _KINDS[verdict] for verdict, words in OF_UNTESTED.items()}
 def read_published() -> dict[str, Any]:
     """The published verdicts, which the study of readings writes.
 
-    They are `title`, `basis` (what they rest on, in words) and `claims`: for each id `verdict`, `agreeing` and `of` (numbers of runs of
-    the reference), `decided_by` (the reading that decides an undecided claim, or None) and `ranges` (for each measurement the lowest and
-    the highest value over seeds and processors).
+    They are `title`, `basis` (what they rest on, in words) and `claims`: for each id `verdict`, `runs` (of the reference: in how many it is
+    reproduced, partly and not), `decided_by` (the reading that decides an undecided claim, or None) and `ranges` (for each measurement the
+    lowest and the highest value over seeds and processors).
     """
     return json.loads(PUBLISHED.read_text(encoding="utf-8"))
 
@@ -53,7 +53,7 @@ def box(records: Sequence[Mapping[str, Any]], published: Mapping[str, Any]) -> l
         rows.append(
             {
                 "claim": f"{record['id']} {record['short']}",
-                "published": f"{known['verdict']}, {known['agreeing']} of {known['of']} runs",
+                "published": f"{known['verdict']} ({'/'.join(map(str, known['runs']))})",
                 "this run": record["verdict"],
                 "because": f"{limit['words']}: {short(limit['value'])}, needed {needed(limit)}" if limit else "",
             }

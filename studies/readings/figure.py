@@ -16,7 +16,7 @@ def draw(data: dict) -> matplotlib.figure.Figure:
     """Draws the shares that `summary.shares` returns, under `shares`."""
     shares: pd.DataFrame = data["shares"]
     figure, down = new_sheet(
-        DOUBLE, 3.6, "Verdicts on each claim by reading of the paper", "Share of runs; empty where a reading changes nothing."
+        DOUBLE, 3.6, "C6 fails in nearly all runs; C4 and C5 turn", "Share of runs; empty where a reading changes nothing."
     )
     axes = panels(figure, down + 0.35, 1, 1, right=0.1)[0, 0]
     box = axes.get_position()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.paper.claims import CLAIMS, NOT_REPRODUCED, OF_UNTESTED, REPRODUCED, verdict
+from enhsim_tf.paper.claims import CLAIMS, NOT_REPRODUCED, OF_UNTESTED, PARTLY, REPRODUCED, verdict
 from enhsim_tf.paper.report import UNDECIDED
 from enhsim_tf.paper.settings import make_settings
 from studies.readings.run import KEYS, READINGS
@@ -62,7 +62,8 @@ def decide(found: pd.DataFrame, claim: str) -> dict[str, Any]:
         claim: Its id.
 
     Returns:
-        `verdict`, `agreeing` and `of` (runs of the reference), and `decided_by`: the readings that differ if it is undecided, or None.
+        `verdict`; `runs`, the numbers of runs of the reference in which the claim is reproduced, partly reproduced and not; and
+        `decided_by`, the readings that differ if it is undecided, or None.
     """
     of_claim = found[found["claim"] == claim]
     counts = {reading: collections.Counter(part["verdict"]) for reading, part in of_claim.groupby("reading", sort=False)}
@@ -75,8 +76,7 @@ def decide(found: pd.DataFrame, claim: str) -> dict[str, Any]:
     causes = differing if agreeing >= SHARE * total else ["seed", *differing]
     return {
         "verdict": common if is_decided else UNDECIDED,
-        "agreeing": agreeing,
-        "of": total,
+        "runs": [counts["reference"][each] for each in (REPRODUCED, PARTLY, NOT_REPRODUCED)],
         "decided_by": None if is_decided else ", ".join(causes),
     }
 

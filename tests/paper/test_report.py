@@ -107,6 +107,6 @@ def test_headings_are_in_order_and_links_lead_to_places(page):
 def test_what_the_box_shows_is_what_decides():
     limit = {"name": "x", "words": "x", "value": 0.25, "low": None, "high": 0.1, "decides": "basic", "holds": False}
     record = {"id": "C1", "short": "s", "verdict": "not reproduced", "deciding": limit}
-    rows = report.box([record], {"claims": {"C1": {"verdict": "undecided", "agreeing": 6, "of": 10}}})
-    assert list(rows[0].values()) == ["C1 s", "undecided, 6 of 10 runs", "not reproduced", "x: 0.25, needed at most 0.1"]
+    rows = report.box([record], {"claims": {"C1": {"verdict": "undecided", "runs": [6, 3, 1]}}})
+    assert list(rows[0].values()) == ["C1 s", "undecided (6/3/1)", "not reproduced", "x: 0.25, needed at most 0.1"]
     assert all(value in report.as_text(rows) for value in rows[0].values())
