@@ -91,7 +91,7 @@ def refused():
     @contextlib.contextmanager
     def refused(*words: str):
         with pytest.raises(InputError) as caught:
-            yield
+            yield caught
         message = str(caught.value)
         assert len(message.splitlines()) == 1
         assert message.startswith("Expected ") and "Received: " in message
@@ -99,6 +99,14 @@ def refused():
             assert word in message
 
     return refused
+
+
+@pytest.fixture
+def pretended(monkeypatch):
+    """Environment variables that name a server of InfluxDB that does not exist."""
+    pytest.importorskip("influxdb_client")
+    for name, value in {"URL": "http://127.0.0.1:9", "TOKEN": "token-0123456789abcdef==", "ORG": "nobody"}.items():
+        monkeypatch.setenv(f"INFLUXDB_V2_{name}", value)
 
 
 @pytest.fixture

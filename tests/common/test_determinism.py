@@ -20,10 +20,10 @@ ROOT = Path(__file__).parents[2]
 OTHERS = "Nehalem", "Haswell"  # an older processor, and one without AVX-512
 
 
-@pytest.fixture(scope="module")
-def model(tmp_path_factory):
+@pytest.fixture
+def model(tmp_path):
     """A simulator whose network is wide enough for its sums to be rounded in many ways."""
-    rng, folder = np.random.default_rng(0), tmp_path_factory.mktemp("models") / "volts"
+    rng, folder = np.random.default_rng(0), tmp_path / "volts"
     kernels = [(rng.standard_normal(size) / np.sqrt(size[0])).astype(np.float32) for size in ((120, 256), (256, 256), (256, 120))]
     layers = tuple((kernel, np.zeros(kernel.shape[1], np.float32)) for kernel in kernels)
     enhancer = Enhancer("network", 120, 1, 1, np.zeros(1, np.float32), np.zeros(120, np.float32), (), layers)
@@ -40,14 +40,10 @@ def generated(model, out, **environment):
     return shard.read_bytes(), pd.read_parquet(shard)
 
 
-@pytest.fixture(scope="module")
-def here(model, tmp_path_factory):
-    return generated(model, tmp_path_factory.mktemp("here") / "set")
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the settings choose among instructions of x86")
-def test_to_rounding_on_another(model, here, tmp_path):
+def test_to_rounding_on_another(model, tmp_path):
+    here = generated(model, tmp_path / "here")
     elsewhere = [generated(model, tmp_path / kernels, OPENBLAS_CORETYPE=kernels) for kernels in OTHERS]
     for _, table in elsewhere:
         pd.testing.assert_frame_equal(table.drop(columns="window"), here[1].drop(columns="window"))  # all that is drawn is the same

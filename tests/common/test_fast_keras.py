@@ -39,16 +39,12 @@ def small_enhancer():
     return dense_stack(WINDOW, (WINDOW, UNITS, UNITS, WINDOW), seed=4, name="enhancer")
 
 
-@pytest.fixture(params=[3, 13])
-def blocks(request, monkeypatch):
-    """Sets the number of rows in a block of the widest kernel, none of which divides its 20 rows."""
-    monkeypatch.setattr(fast_keras, "BLOCK_BYTES", 4 * UNITS * request.param)
-
-
+@pytest.mark.parametrize("rows", [3, 13, 400])  # of a block; none divides the 20 rows of the widest kernel, and 400 are no block
 @pytest.mark.parametrize(("batch_size", "rate"), [(20, lambda: keras.optimizers.schedules.CosineDecay(0.003, 20)), (33, lambda: 0.001)])
-def test_it_trains_as_keras_adam_does(blocks, batch_size, rate):
+def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
+    monkeypatch.setattr(fast_keras, "BLOCK_BYTES", 4 * UNITS * rows)
     network, again, plain = small_enhancer(), small_enhancer(), small_enhancer()
-    assert is_wide_dense_stack(network)
+    assert is_wide_dense_stack(network) == (rows < UNITS)
     for each in (network, again):
         found = fit_windows(each, SOURCE, TARGET, 3, batch_size, seed=3, learning_rate=rate())
     plain.compile(keras.optimizers.Adam(rate()), loss="mean_squared_error")

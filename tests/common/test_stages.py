@@ -12,6 +12,7 @@ from enhsim_tf.common.atomic_files import replace_folder
 from enhsim_tf.common.console import SILENT
 from enhsim_tf.common.stages import Stages, default_cache, load_arrays, save_arrays
 from enhsim_tf.paper.settings import make_settings
+from tests.datasets.test_generate import flip
 
 
 class Work:
@@ -89,12 +90,6 @@ def test_a_stage_reports_progress_under_its_name_if_asked_to(tmp_path, monkeypat
     done = Stages(tmp_path, tell=told.append, speaks=True)
     done.run("enhancer", lambda folder: done.progress.loop("epoch", 4)(1), ())
     assert told[1].startswith("enhancer     epoch 1 of 4, 25 %")
-
-
-def flip(path):
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
 
 
 DAMAGES = {

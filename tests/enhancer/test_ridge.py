@@ -22,7 +22,8 @@ def _standardised(inputs, like):
     return ((inputs - like.mean(axis=0)) / deviation).reshape(len(inputs), -1)
 
 
-@pytest.mark.parametrize("num_windows", [10, 24, 200])  # fewer windows than inputs, as many, more
+# so few that two factors hold fewer numbers: 5 * (24 + 7) < 24 * 7 <= 6 * (24 + 7); fewer than inputs; as many; more
+@pytest.mark.parametrize("num_windows", [5, 6, 24, 200])
 @pytest.mark.parametrize("penalty", [1e-3, 1e4])
 def test_it_is_scikit_learns_on_standardised_windows(num_windows, penalty):
     inputs, targets, _ = _linear(num_windows)
@@ -31,10 +32,12 @@ def test_it_is_scikit_learns_on_standardised_windows(num_windows, penalty):
     expected = SklearnRidge(alpha=penalty).fit(_standardised(inputs, inputs), targets).predict(_standardised(new, inputs))
     np.testing.assert_allclose(found.predict(new), expected, rtol=1e-5, atol=1e-5)
     assert found.penalty == penalty and found.predict(new).dtype == np.float32
+    assert len(found.factors) == (2 if num_windows == 5 else 1)
 
 
 def test_the_chosen_penalty_is_that_of_a_plain_loop():
     inputs, targets, _ = _linear(60, noise=3.0)
+    targets += 100  # far from zero
     penalties, squares = [0.1, 30.0, 1000.0], np.zeros(3)
     for held_out in np.array_split(np.arange(60), 5):
         training = np.setdiff1d(np.arange(60), held_out)
@@ -42,22 +45,6 @@ def test_the_chosen_penalty_is_that_of_a_plain_loop():
             model = SklearnRidge(alpha=penalty).fit(_standardised(inputs[training], inputs[training]), targets[training])
             squares[number] += np.sum((model.predict(_standardised(inputs[held_out], inputs[training])) - targets[held_out]) ** 2)
     assert fit_ridge(inputs, targets, penalties=penalties).penalty == penalties[np.argmin(squares)] == 30.0
-
-
-@pytest.mark.parametrize(("factor", "offset"), [(1e6, 0.0), (1e-6, -3.0)])
-def test_the_unit_of_a_column_changes_nothing(factor, offset):
-    inputs, targets, _ = _linear(80, noise=1.0)
-    new, *_ = _linear(5, seed=1)
-
-    def in_other_unit(windows):
-        return np.stack([windows[..., 0], factor * windows[..., 1] + offset], axis=2)
-
-    first, second = fit_ridge(inputs, targets), fit_ridge(in_other_unit(inputs), targets)
-    assert first.penalty == second.penalty
-    np.testing.assert_allclose(first.predict(new), second.predict(in_other_unit(new)), rtol=1e-5, atol=1e-5)
-    in_unit = fit_ridge(inputs, factor * targets + offset)
-    assert in_unit.penalty == first.penalty
-    np.testing.assert_allclose(in_unit.predict(new), factor * first.predict(new) + offset, rtol=1e-4, atol=1e-4 * factor)
 
 
 def test_constant_samples_and_constant_columns_do_no_harm():
@@ -105,16 +92,6 @@ def test_chosen_penalties_are_kept_and_nothing_is_cross_validated():
     for channel, penalty in enumerate(found.chosen):
         alone = fit_ridge(inputs, targets[:, channel::2], penalties=[penalty])
         np.testing.assert_allclose(found.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4)
-
-
-@pytest.mark.parametrize(("num_windows", "is_low_rank"), [(5, True), (6, False)])  # 5 * (24 + 7) < 24 * 7 <= 6 * (24 + 7)
-def test_few_windows_give_two_factors_with_the_map_of_the_full_matrix(num_windows, is_low_rank):
-    inputs, targets, _ = _linear(num_windows)
-    found, new = fit_ridge(inputs, targets, penalties=[3.0]), _linear(5, seed=1)[0]
-    assert len(found.factors) == 1 + is_low_rank
-    design, centred = _standardised(inputs, inputs), targets - targets.mean(axis=0)
-    full = np.linalg.solve(design.T @ design + 3.0 * np.eye(24), design.T @ centred)
-    np.testing.assert_allclose(found.predict(new), targets.mean(axis=0) + _standardised(new, inputs) @ full, rtol=1e-5, atol=1e-5)
 
 
 def test_windows_may_overlap_and_come_in_any_order():

@@ -20,11 +20,7 @@ TOKEN, PASSWORD = "token-0123456789abcdef==", "pass-0123456789"
 
 
 @pytest.fixture(autouse=True)
-def named_server(monkeypatch):
-    """Environment variables that name a server that does not exist."""
-    pytest.importorskip("influxdb_client")
-    for name, value in {"URL": "http://127.0.0.1:9", "TOKEN": TOKEN, "ORG": "ours"}.items():
-        monkeypatch.setenv(f"INFLUXDB_V2_{name}", value)
+def named_cluster(pretended, monkeypatch):
     monkeypatch.setenv("RAY_ADDRESS", f"ray://user:{PASSWORD}@127.0.0.1:9")
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.random import default_rng
+from scipy.signal import lfilter
 
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise, JointAutoregression
 
@@ -20,11 +21,7 @@ def test_gaussian_noise_of_several_channels_keeps_their_covariance():
 
 def second_order(first, second, number, samples, seed):
     """Windows of an AR(2) process with innovations of standard deviation 1, after a burn-in of 500 samples."""
-    draws = default_rng(seed).standard_normal((number, samples + 500))
-    values = np.zeros_like(draws)
-    for t in range(2, samples + 500):
-        values[:, t] = first * values[:, t - 1] + second * values[:, t - 2] + draws[:, t]
-    return values[:, 500:]
+    return lfilter([1.0], [1.0, -first, -second], default_rng(seed).standard_normal((number, samples + 500)))[:, 500:]
 
 
 def criterion(windows, order):
@@ -71,9 +68,7 @@ def test_generated_autoregression_is_stationary_and_has_the_closed_form():
 def test_joint_autoregression_recovers_the_channels_and_their_cross_correlation():
     number, samples, correlation = 400, 300, 0.8
     draws = default_rng(0).multivariate_normal([0, 0], [[1, correlation], [correlation, 1]], (number, samples))
-    values = draws.copy()
-    for t in range(1, samples):
-        values[:, t] += [0.9, -0.5] * values[:, t - 1]
+    values = np.stack([lfilter([1.0], [1.0, -memory], draws[:, :, channel]) for channel, memory in enumerate((0.9, -0.5))], axis=2)
     fitted = JointAutoregression.fit(values[:, 100:] * [2.0, 7.0], max_order=1)
     error = 5 / np.sqrt(number * 200)
     for each, coefficient, scale in zip(fitted.channels, (0.9, -0.5), (2.0, 7.0), strict=True):

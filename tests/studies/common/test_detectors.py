@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 from studies.common.detectors import DETECTORS, ConvolutionalAutoencoder, DenseAutoencoder, NearestNeighbours
-
-
-def waves(number, seed, noise_sd=0.1):
-    """Sines of 40 samples at random phases, in noise, around 5."""
-    rng = np.random.default_rng(seed)
-    phases = rng.uniform(0, 2 * np.pi, (number, 1))
-    return (5 + np.sin(2 * np.pi * np.arange(100) / 40 + phases) + noise_sd * rng.standard_normal((number, 100))).astype(np.float32)
+from tests.detection.test_detectors import waves
 
 
 @pytest.mark.parametrize("name", ["nearest neighbours", "one-class SVM", "dense autoencoder", "convolutional autoencoder"])

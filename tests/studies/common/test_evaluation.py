@@ -5,16 +5,7 @@ import numpy as np
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
 from studies.common.evaluation import cross_fitted_scores, evaluate_arm, make_trial
-
-
-class Largest:
-    """Scores a window by its maximum, so that all rates can be computed by hand."""
-
-    def fit(self, windows):
-        return self
-
-    def score(self, windows):
-        return np.max(windows, axis=1)
+from tests.simulator.test_scoring import Largest
 
 
 def noise(num_windows, seed):
