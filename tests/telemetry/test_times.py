@@ -1,0 +1,56 @@
+"""Times in forms that only a rule tells apart, each worked by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.telemetry.cleaning.times import date_forms, parse_times, refuse_days, refuse_repeated_local_hour
+
+DAY = 45_000.0  # of a spreadsheet: 2023-03-15
+
+
+@pytest.mark.parametrize("step", [1 / 24, 1 / 1_440, 0.1 / 86_400])
+def test_steps_of_whole_hours_minutes_or_tenth_seconds_look_like_days(refused, step):
+    with refused("may be days or seconds", "excel (from 2023-03-15"):
+        refuse_days(DAY + step * np.arange(5), "clock")
+
+
+@pytest.mark.parametrize("step", [1.0, 0.25, 0.01 / 86_400, 2.3 / 864_000])
+def test_other_steps_do_not(step):
+    refuse_days(DAY + step * np.arange(5), "clock")
+
+
+def test_whole_days_do_in_a_column_of_dates(refused):
+    with refused("may be days or seconds"):
+        refuse_days(DAY + np.arange(5), "date", even_whole=True)
+
+
+def test_a_damaged_number_in_text_is_marked_and_the_others_are_read():
+    times = parse_times(pd.Series(["0", "x", "2", "3"]), "clock", drop=True)
+    assert times.bad.tolist() == [False, True, False, False]
+    assert times.stamps[[0, 2, 3]].second.tolist() == [0, 2, 3]
+
+
+def test_whole_numbers_with_a_fraction_column_are_read_by_their_format():
+    times = parse_times(pd.Series([2024061.0, np.nan, 2024062.0]), "clock", form="%Y%j")
+    assert times.stamps[[0, 2]].strftime("%m-%d").tolist() == ["03-01", "03-02"]
+
+
+@pytest.mark.parametrize(
+    ("text", "form"), [("2024-061", "%Y-%j"), ("1/13/2024 1:05 PM", "%m-%d-%Y %I:%M %p"), ("13.1.2024 1:05:07.5", "%d-%m-%Y %H:%M:%S.%f")]
+)
+def test_the_form_of_dates(text, form):
+    mark = next(each for each in text if not each.isdigit())
+    assert date_forms(pd.Series([text])) == [form.replace("-", mark)]
+
+
+class Log:
+    def place(self, number):
+        return f"row {number}"
+
+
+@pytest.mark.parametrize("minutes", [[0, 20, 40, 60, 20, 40, 60], [0, 20, 20, 40, 60, 20, 40, 60]])
+def test_times_that_step_back_by_an_hour_are_refused(refused, minutes):
+    minutes = np.array(minutes) - np.where(np.arange(len(minutes)) > len(minutes) - 4, 20, 0)  # the clock goes from 60 to 0
+    with refused(f"row {len(minutes) - 3} of volts", "--timezone"):
+        refuse_repeated_local_hour(60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts")
