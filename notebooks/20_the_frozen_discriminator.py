@@ -9,10 +9,11 @@
 # - **Terms:** [generator and discriminator](../docs/glossary.md#generator-and-discriminator),
 #   [adversarial loss](../docs/glossary.md#adversarial-loss); *freezing* a network: a step uses its weights and does not change them.
 #
-# **What the paper says** (section 2.3): after the discriminator's turn its "weights are frozen, and the generator is trained as part of
-# the entire GAN model". The paper ran on TensorFlow 2.1, and so did the classic way to write that sentence down: compile the
-# discriminator, set `trainable = False`, compile the *stack*, which is the generator and the discriminator in one model. Many tutorials
-# have it. Under Keras 3 it does not train the discriminator, and hardly says so.
+# **What the paper says** (section 2.3): after the discriminator's turn its "weights are frozen, and the generator is trained as part of the
+# entire GAN model". The paper ran on TensorFlow 2.1, and so did the classic way to write that sentence down: compile the discriminator, set
+# `trainable = False`, compile the *stack*, which is the generator and the discriminator in one model. Many tutorials have it, [for
+# example](https://github.com/eriklindernoren/Keras-GAN/blob/master/gan/gan.py). Under Keras 3 it does not train the discriminator, and
+# hardly says so.
 
 # %%
 import warnings
@@ -113,7 +114,8 @@ assert [warning.category for warning in heard] == [UserWarning]
 #
 # ## Why
 #
-# What a model may train is asked for at another moment than it used to be:
+# What a model may train is asked for at another moment than it used to be ([documentation of Keras
+# 2](https://github.com/keras-team/keras/blob/2.3.1/docs/templates/getting-started/faq.md)):
 #
 # | | when is `trainable` read? | so `discriminator.train_on_batch` |
 # |---|---|---|
@@ -160,7 +162,7 @@ def update(optimizer, weights, error):
 
 rng, named_losses = np.random.default_rng(0), []
 for _ in range(60):
-    latent = rng.standard_normal((64, 16), "float32")
+    latent = rng.standard_normal((64, 16)).astype("float32")
     batches = (rng.choice(real_noise, 64), real_labels), (generator(latent), generated_labels)
     weights = discriminator.trainable_variables
     named_losses.append(
@@ -261,16 +263,20 @@ def lazy():
     pass
 
 
+def partial():
+    discriminator.trainable_variables[0].assign_add(tf.ones_like(discriminator.trainable_variables[0]))
+
+
 def greedy():
     honest()
     generator.trainable_variables[0].assign_add(tf.ones_like(generator.trainable_variables[0]))
 
 
 lists = discriminator.trainable_variables, generator.trainable_variables
-answers = [moves_exactly(step, *lists) for step in (honest, lazy, greedy)]
+answers = [moves_exactly(step, *lists) for step in (honest, lazy, partial, greedy)]
 check_answer(
     None if answers[0] is None else answers,
-    lambda found: [bool(answer) for answer in found] == [True, False, False],
+    lambda found: [bool(answer) for answer in found] == [True, False, False, False],
     "Copy all weights before the step, and compare each of them after it.",
 )
 

@@ -136,7 +136,7 @@ with drawing(alt, height=2.2, title=title) as panel:
     panel.set_yticks(range(len(arms)), list(arms))
     panel.set(xscale="log", xlim=(least / 1.5, 0.04), ylim=(len(arms) - 0.5, -0.5))
     panel.set(
-        xlabel="score of real nominal windows, 1 % to 99 % (bar), and threshold of the arm (tick; dimensionless)"
+        xlabel="score of real nominal windows, 1 % to 99 % (bar), and threshold, at least 0.00001 (tick; dimensionless)"
     )
 
 # %% [markdown]
@@ -165,8 +165,7 @@ if is_full:
 # ## The scale of the noise
 #
 # How exact must the standard deviation be? Multiply the Gaussian noise of the enhanced arm by a factor, train the detector, set its
-# threshold, and count the alarms. (The noise is drawn anew here and in notebooks 21 and 29, so the rate at factor 1 differs by up to a
-# point.)
+# threshold, and count the alarms. (The noise is drawn anew here and in notebook 21, so the rate at factor 1 differs by up to a point.)
 
 # %%
 (first, second), noises = np.split(enhanced, 2), rng.standard_normal((2, number, enhanced.shape[1]))
@@ -231,8 +230,7 @@ assert not is_full or shot_alarms["Gaussian"] > 0.1 > 0.03 > shot_alarms["noise 
 # ## All of it at once
 #
 # A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, with five seeds. It has no Gaussian noise,
-# which does well here because the real noise is Gaussian. Its arm *enhanced* has no noise at all. What its title says holds among its six
-# arms.
+# which does well here because the real noise is Gaussian. Its arm *enhanced* has no noise at all.
 #
 # ![False alarms by training data](../studies/robustness/results/false_alarms.png)
 
@@ -244,13 +242,15 @@ for name, rate in mean.items():
 
 # %% [markdown]
 # *What to see:* the marks of the perfect simulator (*truth*) are far on the right: the best signal does not help without noise. Those of
-# the paper's GAN are scattered over the whole axis: it depends on the detector. Those of *ridge + residual windows* are near those of
-# real telemetry, whatever the detector.
+# the paper's GAN are scattered over the whole axis: it depends on the detector. Those of *ridge + residual windows* are near those of real
+# telemetry, whatever the detector. *Coarse*, which gave no false alarms with the PCA residual, gives up to 100 % with others.
 
 # %%
 assert min(mean["truth"], mean["enhanced"]) > 0.8 and mean["enhanced + GAN"] > 5 * mean["real"]
 for about in published["arms"]["enhanced + GAN"]["by_environment"].values():
     assert min(about["detectors"].values()) < 0.02 and max(about["detectors"].values()) > 0.5
+for about in published["arms"]["coarse"]["by_environment"].values():
+    assert about["detectors"]["PCA residual"] < 0.01 and max(about["detectors"].values()) > 0.99
 for about in published["arms"]["ridge + residual windows"]["by_environment"].values():
     assert max(about["detectors"].values()) < 0.05
 
@@ -260,17 +260,24 @@ for about in published["arms"]["ridge + residual windows"]["by_environment"].val
 # C8 is judged with three detectors. The first is that of this lesson. An *isolation forest* describes a window by 14 numbers, such as its
 # standard deviation, and finds those that few random cuts separate from the rest. A *dense autoencoder* is a network that presses a window
 # through a layer of 16 units and scores what it cannot restore. Each is trained on the enhanced signal with the GAN's noise. It counts *as
-# good as if trained on telemetry* if its false alarms are at most twice those after training on real windows plus one point, and its recall
-# is at most five points lower. C8 holds in part if half of the detectors are as good, and fully if all are.
+# good as if trained on telemetry* if its false alarms are at most twice those after training on real windows plus one point, and its
+# [recall](../docs/glossary.md#recall) is at most five points lower. C8 holds in part if half of the detectors are as good, and fully if all
+# are.
 
 # %%
-_ = verdict(pipeline, "C8")
+(record,) = verdict(pipeline, "C8")
+for name in ("PCA residual", "isolation forest", "dense autoencoder"):
+    for arm in ("enhanced + GAN noise", "real"):
+        about = (
+            f"{record['measured'][f'{part}, {arm}, {name}']:6.1%}" for part in ("false alarms", "recall")
+        )
+        print(f"{name:18} {arm:21} false alarms and recall", *about)
 
 # %% [markdown]
-# **Answer.** What the detector cannot describe of them, which must be as large as what it cannot describe of real windows. Where the signal
-# is right, that is the noise. For the PCA residual, its scale must be right to a few per cent, and noise of few directions or of another
-# kind sets a wrong threshold even then. Noise drawn from real noise or residuals set a right one in each case tried here. (How many faults
-# a detector finds is another matter: with no false alarm at all, it may find none.)
+# **Answer.** The part of the training windows that the detector cannot describe. It must be as large as the part of real windows that the
+# detector cannot describe. Where the signal is right, that is the noise. For the PCA residual, its scale must be right to a few per cent,
+# and noise of few directions or of another kind sets a wrong threshold even then. Noise drawn from real noise or residuals set a right one
+# in each case tried here. (How many faults a detector finds is another matter: with no false alarm at all, it may find none.)
 #
 # ## Exercises
 #
@@ -298,9 +305,11 @@ check_answer(
 factor_of_threshold = None  # your answer
 
 # %%
+louder_halves = [half + 1.1 * noise_sd * noise for half, noise in zip((first, second), noises)]
+steps = fit_pca, scores_of, threshold_for
 check_answer(
     factor_of_threshold,
-    lambda answer: not is_full or 1.13 < answer < 1.25,
+    lambda answer: abs(answer - answers_tool.louder_threshold(*steps, louder_halves, calibration)) < 0.06,
     "A score is a mean of squares.",
 )
 

@@ -28,7 +28,7 @@ def volts(name):
     return clean(read_source(folder / name)["volts"]).longest.values.astype(float)
 
 
-def columns(name):
+def run_of(name):
     return read_recording(folder / name).parts[0].values.astype(float)
 
 
@@ -36,8 +36,8 @@ def cut(values, starts):
     return np.stack([values[start : start + window] for start in starts])
 
 
-telemetry, run = volts("telemetry.csv"), columns("simulator.csv")
-faulty, planned = volts("telemetry_fault.csv"), columns("simulator_planned.csv")
+telemetry, run = volts("telemetry.csv"), run_of("simulator.csv")
+faulty, planned = volts("telemetry_fault.csv"), run_of("simulator_planned.csv")
 is_fault = pd.read_csv(folder / "simulator_fault.csv")["mask"].to_numpy() > 0
 
 # %% [markdown]
@@ -114,8 +114,8 @@ def judge(view, generate=None):
 
 
 # %% [markdown]
-# Five uses differ only in what the detector sees. The simulator's columns are voltage, current and temperature; the current is what was
-# commanded.
+# Four of the five uses below differ only in what the detector sees. The *source* sees the same as *no simulator*; it differs in the windows
+# that the detector learns. The simulator's columns are voltage, current and temperature; the current is what was commanded.
 
 
 # %%
@@ -164,9 +164,10 @@ with drawing(alt, height=2.2, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* as a reference, the simulator finds most of the fault; as a source, it finds as little as no simulator does, and flags as
-# many nominal windows. A detector that looks at a window alone must accept every voltage that some nominal window has. The reference is
-# told what was commanded; the current alone does not say which voltage follows. No use keeps to the 1 % that its threshold was set for.
-# (Notebook 27 has another detector on the same run; its shares are of other windows.)
+# many nominal windows. With as many finds as false alarms, these two are no better than chance. A detector that looks at a window alone
+# must accept every voltage that some nominal window has. The reference is told what was commanded; the current alone does not say which
+# voltage follows. No use keeps to the 1 % that its threshold was set for. (Notebook 27 has another detector on the same run; its shares are
+# of other windows.)
 
 # %%
 print(pd.DataFrame(results).T.round(3).to_string())
@@ -216,7 +217,7 @@ with drawing(alt, height=2.4, title=title) as panel:
 
 # %% [markdown]
 # The intervals are wide. The next table has the false alarms of the battery with the fewest known windows, and what is found on the
-# *aircraft*, whose simulator is a point mass, with ten flights or 100 known windows.
+# *aircraft*, whose simulator is a point mass, with ten flights or 100 known windows, one of four sizes.
 
 # %%
 flights = next(
@@ -224,18 +225,22 @@ flights = next(
     for point in systems["aircraft"]["points"]
     if point["axis"] == "main" and point["simulator"] == "wrong physics" and point["units"] == 10
 )
-of_aircraft = {use: flights[use]["recall"]["mean"] for use in names}
+of_aircraft = {use: flights[use]["recall"] for use in names}
 of_battery = {use: points[0]["uses"][use]["false_alarms"]["mean"] for use in names}
-columns = {f"battery, {num_windows[0]} windows: false alarms": of_battery, "aircraft: found": of_aircraft}
-print(pd.DataFrame(columns).round(3).to_string())
+table = pd.DataFrame(of_aircraft).T[["mean", "low", "high"]].add_prefix("aircraft: found, ")
+table.insert(0, f"battery, {num_windows[0]} windows: false alarms", pd.Series(of_battery))
+print(table.astype(float).round(3).to_string())
 assert min(recall["reference"]) > max(recall["source"])
-assert of_aircraft["reference"] - of_aircraft["no simulator"] < 0.1
+assert (
+    of_aircraft["reference"]["low"] < of_aircraft["no simulator"]["mean"] < of_aircraft["reference"]["mean"]
+)
 assert min(of_battery.values()) > 0.03
 
 # %% [markdown]
-# **Answer.** As a reference, on the battery. As a source it adds little to what the
-# telemetry alone finds. On the aircraft, neither helps much, and the enhanced run finds hardly more than the coarse one. With the fewest
-# known windows, no use keeps to 1 % of false alarms on the battery.
+# **Answer.** As a reference, on the battery. As a source it adds little to what the telemetry alone finds, for a detector that measures the
+# distance from a mean. (The detectors of the battery study find no more with generated windows than with telemetry: notebook 27.) On the
+# aircraft, with ten flights, the reference finds 37 % and the telemetry alone 29 %; their intervals overlap widely. The enhanced run finds
+# hardly more than the coarse one. With the fewest known windows, no use keeps to 1 % of false alarms on the battery.
 #
 # ## Exercises
 #
@@ -246,15 +251,16 @@ assert min(of_battery.values()) > 0.03
 false_alarms_late = None  # your answer
 
 # %%
+from notebooks import answers_tool
+
 check_answer(
     false_alarms_late,
-    lambda share: abs(share - 0.96) < 0.015,
+    lambda share: abs(share - answers_tool.share_when_late(judge, minus_enhanced, telemetry, known)) < 0.005,
     "Only the judged time is late: known windows keep the simulated run of their own time.",
 )
 
 # %% [markdown]
 # **2.** With a lower threshold, *no simulator* would find as many windows as the enhanced run does as a reference. Which threshold is that?
-# What share of false alarms would it cost?
 
 # %%
 detector = fit_distance(cut(telemetry, known))
@@ -297,6 +303,6 @@ check_answer(
 # print(f"false alarms: {np.mean(detector(cut(telemetry, later)) > lower_threshold):.0%}")
 # ```
 #
-# The detector ranks the fault's windows hardly above nominal ones, so no threshold helps.
+# The detector ranks the fault's windows hardly above nominal ones, so this threshold also flags some 70 % of the nominal windows.
 #
 # </details>

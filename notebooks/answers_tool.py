@@ -31,6 +31,14 @@ def repaired_threshold(detector: tuple[np.ndarray, np.ndarray], windows: np.ndar
     return finite_threshold(scores, 0.01)[0]
 
 
+def louder_threshold(
+    fit: Callable, score: Callable, threshold: Callable, halves: Sequence[np.ndarray], real: np.ndarray
+) -> float:
+    """Lesson 22, exercise 2: the threshold from the second half, divided by that from real windows."""
+    detector = fit(halves[0])
+    return threshold(score(detector, halves[1])) / threshold(score(detector, real))
+
+
 # -- 23 ------------------------------------------------------------------------------------------------------
 
 
@@ -88,3 +96,31 @@ def num_different_windows(pipeline: Pipeline, window: int) -> int:
 def num_parameters(pipeline: Pipeline) -> int:
     """Lesson 29, exercise 2: the number of parameters of the enhancer."""
     return pipeline.enhancer.count_params()
+
+
+# -- 30 ------------------------------------------------------------------------------------------------------
+
+
+def share_when_late(
+    judge: Callable, view: Callable, telemetry: np.ndarray, known: np.ndarray, shift: int = 50
+) -> float:
+    """Lesson 30, exercise 1: the share of false alarms if the simulator is late in all judged time."""
+
+    def seen(learnt: np.ndarray, simulated: np.ndarray, real: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        in_time = real is telemetry and starts[-1] <= known[-1]
+        return view(learnt, simulated if in_time else np.roll(simulated, shift, axis=0), real, starts)
+
+    return judge(seen)["false alarms"]
+
+
+# -- 31 ------------------------------------------------------------------------------------------------------
+
+
+def share_late(score: Callable, delayed: np.ndarray, residuals: np.ndarray) -> float:
+    """Lesson 31, exercise 1: the share of late windows above the conformal threshold of the residuals."""
+    return float(np.mean(score(delayed) > finite_threshold(score(residuals), 0.01)[0]))
+
+
+def shared_quarters(features: np.ndarray) -> float:
+    """Lesson 31, exercise 2: the correlation of the first quarters of both channels."""
+    return np.corrcoef(features[:, 0], features[:, 1])[0, 1]
