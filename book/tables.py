@@ -110,7 +110,7 @@ def settings_table(root: Path) -> str:
         (f"`{row['setting']}`", row["value"], row["paper"], row["author"], ": ".join(filter(None, (row["source"], row["why"]))))
         for row in decisions()
     ]
-    return markdown(("setting", "here", "paper", "author's code", "source"), rows)
+    return markdown(("setting", "here", "paper", "author's code", "source: reason"), rows)
 
 
 def speed(root: Path) -> str:
