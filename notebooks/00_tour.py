@@ -284,7 +284,7 @@ assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 # root-mean-square difference.
 
 # %%
-from enhsim_tf.paper.square_wave import MODES
+from enhsim_tf.paper.degraded import MODES
 
 say(f"Modes: {', '.join(MODES)}.")
 nominal = pipeline.enhance(degraded(pipeline, "nominal", 0.8)[0])

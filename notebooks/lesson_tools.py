@@ -96,7 +96,7 @@ def degraded(pipeline: Pipeline, mode: str, severity: float) -> "tuple[np.ndarra
 
     Args:
         pipeline: As `open_pipeline` returns it.
-        mode: One of `enhsim_tf.paper.square_wave.MODES`, or `nominal`.
+        mode: One of `enhsim_tf.paper.degraded.MODES`, or `nominal`.
         severity: From 0 to 1.
     """
     coarse, truth = (

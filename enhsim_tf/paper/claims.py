@@ -18,9 +18,10 @@ from sklearn.neighbors import KNeighborsRegressor
 
 from enhsim_tf.common import measures
 from enhsim_tf.common.two_sample import two_sample_auc
+from enhsim_tf.paper.degraded import MODES, degrade
 from enhsim_tf.paper.detectors import DETECTORS, threshold
 from enhsim_tf.paper.pipeline import Pipeline
-from enhsim_tf.paper.square_wave import MODES, Signal, degrade
+from enhsim_tf.paper.square_wave import Signal
 
 REPRODUCED, PARTLY, NOT_REPRODUCED, NOT_MEASURED = "reproduced", "partly", "not reproduced", "not measured"
 OF_UNTESTED = {REPRODUCED: "holds", PARTLY: "holds in part", NOT_REPRODUCED: "does not hold"}
