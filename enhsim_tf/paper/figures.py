@@ -37,7 +37,7 @@ from enhsim_tf.common.plot_style import (
     panels,
     title_words,
 )
-from enhsim_tf.paper.claims import measured
+from enhsim_tf.paper.claims import enhancement, noise_resemblance
 from enhsim_tf.paper.enhancer import build_enhancer
 from enhsim_tf.paper.noise import build_discriminator, build_generator, extract_noise
 from enhsim_tf.paper.pipeline import Pipeline
@@ -118,7 +118,7 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """A held-out window: the stepped simulation, the enhanced signal and the true signal; below, the difference of the last two."""
     window = sample(pipeline, "test", 1, "figure 4")
     enhanced, truth = pipeline.enhance(window["coarse"])[0], window["truth"][0]
-    errors = measured("enhancement", pipeline)
+    errors = enhancement(pipeline)
     words = ", ".join(f"{name} {errors[f'{key}nrmse']:.3f}" for name, key in (("coarse", "coarse_"), ("enhanced", ""), ("ridge", "ridge_")))
     figure, down = new_sheet(
         DOUBLE,
@@ -170,7 +170,7 @@ def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
 @paper_figure("fig06_real_or_generated_noise", "Real or generated: windows of noise (a counterpart)", needs_training=True)
 def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Eight windows of noise in random order; four are generated."""
-    rng, found = pipeline.draw("figure 6"), measured("noise resemblance", pipeline)
+    rng, found = pipeline.draw("figure 6"), noise_resemblance(pipeline)
     real, minutes = pipeline.noise_windows("test", 4, "figure 6, real"), sample(pipeline, "test", 1, "figure 6")["minutes"]
     hint = f"effective rank: generated {found['rank']:.0f}, real {found['real_rank']:.0f}"
     return guess("Which windows of noise are generated?", minutes, real, pipeline.generate_noise(4, rng), rng, hint)
