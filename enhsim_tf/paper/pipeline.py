@@ -1,6 +1,6 @@
 """Figure 1: the pipeline, "steps involved in the process" 1 to 9 and "Combined", each kept as a stage.
 
-Nothing is computed before it is asked for, so the figures without networks are drawn before any training.
+Nothing is computed before it is asked for, so a figure trains only the networks that it shows.
 """
 
 import functools
