@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from benchmarks.report import speed_table
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.paper.settings import decisions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,6 +105,8 @@ def _table_of_readings(root: Path) -> "pd.DataFrame":
 
 def settings_table(root: Path) -> str:
     """The table of decisions: each setting, the paper's and the author's value, and where the value comes from."""
+    from enhsim_tf.paper.report import decisions  # with the networks, TensorFlow
+
     rows = [
         (f"`{row['setting']}`", row["value"], row["paper"], row["author"], ": ".join(filter(None, (row["source"], row["why"]))))
         for row in decisions()

@@ -130,9 +130,9 @@ def run(options: argparse.Namespace) -> int:
         from enhsim_tf.own_channel import OwnChannel
 
         pipeline = OwnChannel(settings, stages, store, options.telemetry, options.column, options.time)
-    chosen = [name for name in FIGURES if options.only in (None, name.split("_")[0])]
-    for name in sorted(chosen, key=lambda name: FIGURES[name].needs_training):
-        save_figure(name, pipeline, folder, foot_of(options, name), options.budget == "smoke")
+    for name in FIGURES:
+        if options.only in (None, name.split("_")[0]):
+            save_figure(name, pipeline, folder, foot_of(options, name), options.budget == "smoke")
     if options.only:
         return 0
 

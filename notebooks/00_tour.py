@@ -26,7 +26,7 @@ from lesson_tools import (
     verdict,
 )
 
-from enhsim_tf.paper.claims import measured
+from enhsim_tf.paper.claims import detection, enhancement, noise_resemblance
 
 pipeline, budget = open_pipeline()
 
@@ -85,7 +85,7 @@ show(pipeline, "fig04_enhanced_simulation")
 # ([04](04_enhanced_simulation.ipynb)).
 
 # %%
-errors = measured("enhancement", pipeline)
+errors = enhancement(pipeline)
 before, after, ridge = (errors[f"{name}nrmse"] for name in ("coarse_", "", "ridge_"))
 test = pipeline.windows("test")
 rough, smooth = (np.diff(windows).std() for windows in (pipeline.enhance(test["coarse"]), test["truth"]))
@@ -147,7 +147,7 @@ if budget == "full":
 # *effective rank* counts ([05](05_real_or_generated.ipynb)):
 
 # %%
-shared, ranks = {}, measured("noise resemblance", pipeline)
+shared, ranks = {}, noise_resemblance(pipeline)
 four_generated = pipeline.generate_noise(4, pipeline.draw("figure 6"))
 four_real = pipeline.noise_windows("test", 4, "figure 6, real")
 for name, four in {"generated": four_generated, "real": four_real}.items():
@@ -230,7 +230,7 @@ assert budget == "smoke" or alarms["combined"] > 0.9 > 0.1 > alarms["telemetry"]
 # %%
 from enhsim_tf.paper.detectors import DETECTORS
 
-found = measured("detection", pipeline)
+found = detection(pipeline)
 arms = ["coarse", "enhanced", "enhanced + GAN noise", "enhanced + Gaussian noise", "real"]
 rates, recall = (
     pd.DataFrame({arm: {name: found[f"{key}, {arm}, {name}"] for name in DETECTORS} for arm in arms})
@@ -284,7 +284,7 @@ assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 # root-mean-square difference.
 
 # %%
-from enhsim_tf.paper.square_wave import MODES
+from enhsim_tf.paper.degraded import MODES
 
 say(f"Modes: {', '.join(MODES)}.")
 nominal = pipeline.enhance(degraded(pipeline, "nominal", 0.8)[0])

@@ -216,7 +216,7 @@ slider(draw, "severity", [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
 # *period_change*: periods grow), on the windows of the slider:
 
 # %%
-from enhsim_tf.paper.square_wave import MODES
+from enhsim_tf.paper.degraded import MODES
 
 pairs = {}
 for mode in ("nominal", *MODES):

@@ -18,7 +18,7 @@ import numpy as np
 from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, verdict
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
-from enhsim_tf.paper.claims import measured
+from enhsim_tf.paper.claims import noise_resemblance
 
 pipeline, budget = open_pipeline()
 claim("C7")
@@ -139,7 +139,7 @@ assert correlation["generated"] > {"full": 0.3, "smoke": 0.1}[budget] > abs(corr
 # In how many dimensions do many windows vary? The *effective rank* counts them ([09](09_generator.ipynb) writes it in four lines):
 
 # %%
-found = measured("noise resemblance", pipeline)
+found = noise_resemblance(pipeline)
 rank_generated, rank_real = found["rank"], found["real_rank"]
 say(
     f"Effective rank of {len(pipeline.noise_windows('test')):,} windows: **{rank_generated:.1f}** generated, **{rank_real:.0f}** real, "

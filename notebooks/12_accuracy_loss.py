@@ -127,9 +127,9 @@ with drawing(alt, 2, 2.3, title) as panels:
 # number of dimensions that the noise fills.
 
 # %%
-from enhsim_tf.paper.claims import measured
+from enhsim_tf.paper.claims import noise_resemblance
 
-rank = measured("noise resemblance", pipeline)["rank_ratio"]
+rank = noise_resemblance(pipeline)["rank_ratio"]
 after = size[num_records - 1]
 say(
     f"After {settings.iterations:,} iterations, the generated noise has **{after:.2f}** times the standard deviation and **{rank:.2f}** "

@@ -171,7 +171,7 @@ print(pd.DataFrame(rows).T.rename_axis("severity").round(2).to_string())
 
 # %%
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.paper.square_wave import MODES
+from enhsim_tf.paper.degraded import MODES
 
 severities = (0.1, 0.25, 0.5, 1.0)
 cases = {(mode, severity): degraded(pipeline, mode, severity) for mode in MODES for severity in severities}

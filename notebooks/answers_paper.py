@@ -11,8 +11,8 @@ from enhsim_tf.common.measures import effective_rank, nrmse
 from enhsim_tf.detection.detectors import PCAResidual
 from enhsim_tf.detection.metrics import threshold
 from enhsim_tf.paper.claims import degraded_windows
+from enhsim_tf.paper.degraded import MODES
 from enhsim_tf.paper.noise import build_generator, extract_noise
-from enhsim_tf.paper.square_wave import MODES
 
 # -- 00 ----------------------------------------------------------------------------------------------------------------------
 

@@ -25,12 +25,11 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from enhsim_tf.common import figure
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED, QUIET, REAL, STYLE
 from enhsim_tf.common.stages import Stages, default_cache
 from enhsim_tf.paper.claims import BASIC, CLAIMS, OURS, WHOLE, degraded_windows, judge
-from enhsim_tf.paper.figures import DRAWINGS, FIGURES
+from enhsim_tf.paper.figures import FIGURES, save_figure
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.report import needed, short
 from enhsim_tf.paper.settings import make_settings
@@ -81,14 +80,11 @@ def show(pipeline: Pipeline, name: str) -> None:
         pipeline: As `open_pipeline` returns it.
         name: One of `FIGURES`.
     """
-    if FIGURES[name].drawn_by is None:
-        _show_picture((DRAWINGS / f"{name}.png").read_bytes(), FIGURES[name].alt)
-        return
     is_smoke = pipeline.settings.iterations < make_settings().iterations
     caption = f"seed {pipeline.settings.seed} · python -m enhsim_tf.reproduce --only {name.split('_')[0]}"
     with tempfile.TemporaryDirectory() as folder:
-        path, _ = figure.save(name, pipeline, folder, caption, is_smoke, figures=FIGURES)
-        _show_picture(path.read_bytes(), FIGURES[name].alt)
+        save_figure(name, pipeline, Path(folder), caption, is_smoke)
+        _show_picture(Path(folder, f"{name}.png").read_bytes(), FIGURES[name].alt)
 
 
 def degraded(pipeline: Pipeline, mode: str, severity: float) -> "tuple[np.ndarray, np.ndarray]":
@@ -96,7 +92,7 @@ def degraded(pipeline: Pipeline, mode: str, severity: float) -> "tuple[np.ndarra
 
     Args:
         pipeline: As `open_pipeline` returns it.
-        mode: One of `enhsim_tf.paper.square_wave.MODES`, or `nominal`.
+        mode: One of `enhsim_tf.paper.degraded.MODES`, or `nominal`.
         severity: From 0 to 1.
     """
     coarse, truth = (

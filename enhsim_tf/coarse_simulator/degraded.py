@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.paper import square_wave
+from enhsim_tf.paper import degraded
 
 MODES = {
     "stuck": "the mechanism stands still from the onset, for the fraction `severity` of the remaining time",
@@ -70,7 +70,7 @@ def degrade(
     if scenario is None or scenario.severity == 0:
         return signal(time_s)
     onset = min(scenario.first_sample(time_s.shape[1]), time_s.shape[1] - 1)
-    return square_wave.degrade(signal, time_s, scenario.mode, scenario.severity, levels, shortest_period_s, rng, onset)
+    return degraded.degrade(signal, time_s, scenario.mode, scenario.severity, levels, shortest_period_s, rng, onset)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -36,40 +36,32 @@ class Figure:
             return self.drawn_by(data)
 
 
-def save(
-    name: str,
-    data: Mapping[str, np.ndarray],
-    folder: str | os.PathLike,
-    caption: str,
-    is_smoke: bool,
-    *,
-    figures: Mapping[str, Figure],
-) -> list[Path]:
+def save(figure: Figure, name: str, data: Mapping[str, np.ndarray], folder: str | os.PathLike, caption: str, is_smoke: bool) -> list[Path]:
     """Draws a figure and writes it with its caption line. The same data give the same bytes.
 
     Args:
-        name: One of `figures`.
+        figure: The figure.
+        name: Name of its files.
         data: Its arrays.
         folder: An existing folder.
         caption: Caption line, printed at the bottom.
         is_smoke: Whether the arrays come from a smoke run, which a watermark then says.
-        figures: The figures by name.
 
     Returns:
         The paths of the files.
     """
-    figure = figures[name].draw(data)
-    width, height = figure.get_size_inches()
+    drawn = figure.draw(data)
+    width, height = drawn.get_size_inches()
     lines = textwrap.wrap(caption, int((width - 2 * EDGE) * 20.5))
     small = {"size": 7, "color": QUIET, "linespacing": 1.05, "parse_math": False}
-    figure.text(EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
+    drawn.text(EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
     if is_smoke:
         mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
-        figure.text(0.5, 0.5, "SMOKE BUDGET", **mark, ha="center", va="center", zorder=10, gid="watermark")
+        drawn.text(0.5, 0.5, "SMOKE BUDGET", **mark, ha="center", va="center", zorder=10, gid="watermark")
     paths = [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg")]
     with matplotlib.style.context(STYLE):
         for path in paths:
             undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
             with replace_file(path) as temporary:
-                figure.savefig(temporary, metadata={"Title": figures[name].title, "Description": figures[name].alt} | undated)
+                drawn.savefig(temporary, metadata={"Title": figure.title, "Description": figure.alt} | undated)
     return paths

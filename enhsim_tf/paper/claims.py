@@ -17,16 +17,19 @@ from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.neighbors import KNeighborsRegressor
 
 from enhsim_tf.common import measures
+from enhsim_tf.common.stages import load_arrays, save_arrays
 from enhsim_tf.common.two_sample import two_sample_auc
+from enhsim_tf.paper.degraded import MODES, degrade
 from enhsim_tf.paper.detectors import DETECTORS, threshold
 from enhsim_tf.paper.pipeline import Pipeline
-from enhsim_tf.paper.square_wave import MODES, Signal, degrade
+from enhsim_tf.paper.square_wave import Signal
 
 REPRODUCED, PARTLY, NOT_REPRODUCED, NOT_MEASURED = "reproduced", "partly", "not reproduced", "not measured"
 OF_UNTESTED = {REPRODUCED: "holds", PARTLY: "holds in part", NOT_REPRODUCED: "does not hold"}
 """What is said instead of a claim that the paper itself does not test."""
 BASIC, WHOLE, OURS = "basic", "whole", "ours"
 Measured = dict[str, float]
+Measure = Callable[[Pipeline], Measured]
 
 BATTERY_COARSE_S, BATTERY_FINE_S = 0.00669, 0.0501
 """Seconds that one orbit takes in two battery simulators: studies/battery/results/speed.parquet, gentle regime, mean of ten seeds."""
@@ -84,14 +87,37 @@ class Claim:
     section: str
     figure: str
     limits: tuple[Limit, ...]
-    measure: Callable[[Pipeline], Measured]
+    measure: Measure
     is_tested: bool = True
     margin: float = 0.5
+
+
+def kept(stage: str, *networks: str) -> Callable[[Measure], Measure]:
+    """Keeps what a function measures as a stage, after its networks: `enhancer`, `noise GAN` or both.
+
+    Name the stage otherwise when changed code measures something else; the cache then measures it again.
+    """
+
+    def keep(measure: Measure) -> Measure:
+        @functools.wraps(measure)
+        def measured(pipeline: Pipeline) -> Measured:
+            if stage not in pipeline.measured:
+                for network in networks:
+                    _ = pipeline.enhancer_folder if network == "enhancer" else pipeline.gan_folder
+                depends, after = pipeline.settings.of("windows", "noise", "claims"), ["telemetry", *networks]
+                folder = pipeline.stages.run(stage, lambda folder: save_arrays(folder, measure(pipeline)), depends, after)
+                pipeline.measured[stage] = {name: float(value) for name, value in load_arrays(folder).items()}
+            return pipeline.measured[stage]
+
+        return measured
+
+    return keep
 
 
 # -- C1 ----------------------------------------------------------------------------------------------------------------
 
 
+@kept("enhancement", "enhancer")
 def enhancement(pipeline: Pipeline) -> Measured:
     """Errors of the enhancer and of simple baselines that learn from the same windows, on all disjoint test windows."""
     train, test = pipeline.windows("train", pipeline.settings.num_windows, "training windows"), pipeline.windows("test")
@@ -116,6 +142,7 @@ def enhancement(pipeline: Pipeline) -> Measured:
 # -- C2 ----------------------------------------------------------------------------------------------------------------
 
 
+@kept("speed", "enhancer", "noise GAN")
 def speed(pipeline: Pipeline) -> Measured:
     """Time of the coarse simulation alone and of the whole pipeline, medians of five."""
     settings, rng, seconds = pipeline.settings, pipeline.draw("speed"), {"coarse": [], "all": []}
@@ -146,6 +173,7 @@ def speed(pipeline: Pipeline) -> Measured:
 # -- C3 and C8 ---------------------------------------------------------------------------------------------------------
 
 
+@kept("detection", "enhancer", "noise GAN")
 def detection(pipeline: Pipeline) -> Measured:
     """False-alarm rate on real nominal windows and recall in degraded modes, by training data and detector."""
     if not pipeline.is_example:
@@ -180,7 +208,7 @@ def detection(pipeline: Pipeline) -> Measured:
 
 def too_clean(pipeline: Pipeline) -> Measured:
     """C3: the detectors that were trained on the clean enhanced signal."""
-    found = measured("detection", pipeline)
+    found = detection(pipeline)
     if not found:
         return {}
     rates = [found[f"false alarms, enhanced, {name}"] for name in DETECTORS]
@@ -189,7 +217,7 @@ def too_clean(pipeline: Pipeline) -> Measured:
 
 def robust(pipeline: Pipeline) -> Measured:
     """C8: each detector trained on the enhanced signal with the GAN's noise, against the same detector trained on telemetry."""
-    found, is_met = measured("detection", pipeline), []
+    found, is_met = detection(pipeline), []
     if not found:
         return {}
     for name in DETECTORS:
@@ -278,6 +306,7 @@ def resemblance(generated: np.ndarray, real: np.ndarray, again: np.ndarray, seed
     }
 
 
+@kept("noise resemblance", "noise GAN")
 def noise_resemblance(pipeline: Pipeline) -> Measured:
     """C6: generated noise beside the noise of the test part."""
     real = pipeline.noise_windows("test")
@@ -285,6 +314,7 @@ def noise_resemblance(pipeline: Pipeline) -> Measured:
     return resemblance(generated, real, pipeline.noise_windows("train")[: len(real)], pipeline.settings.seed)
 
 
+@kept("sum resemblance", "enhancer", "noise GAN")
 def sum_resemblance(pipeline: Pipeline) -> Measured:
     """C7: the sum of both networks beside the telemetry of the test part."""
     test = pipeline.windows("test")
@@ -306,6 +336,7 @@ def degraded_windows(pipeline: Pipeline, mode: str, signal: Signal, severity: fl
     return degrade(signal, times, mode, severity, (-size, size), settings.rotation_period, draws, onset).astype(np.float32)
 
 
+@kept("degraded", "enhancer")
 def degraded_errors(pipeline: Pipeline) -> Measured:
     """C9: errors of the enhanced signal in degraded modes that the enhancer was not trained on."""
     if not pipeline.is_example:
@@ -320,24 +351,6 @@ def degraded_errors(pipeline: Pipeline) -> Measured:
     return {"share_of_modes": float(np.mean(is_met)), "worst_ratio": max(errors.values()) / found["nrmse, nominal"]} | found
 
 
-BOTH = ("enhancer", "noise GAN")
-MEASUREMENTS: dict[str, tuple[Callable[[Pipeline], Measured], tuple[str, ...], int]] = {
-    "enhancement": (enhancement, ("enhancer",), 1),
-    "speed": (speed, BOTH, 1),
-    "detection": (detection, BOTH, 1),
-    "noise resemblance": (noise_resemblance, ("noise GAN",), 1),
-    "sum resemblance": (sum_resemblance, BOTH, 1),
-    "degraded": (degraded_errors, ("enhancer",), 1),
-}
-"""Measurements that are kept: the function, the networks that it uses, and its version, raised when it gives other results."""
-
-
-def measured(name: str, pipeline: Pipeline) -> Measured:
-    """The measurements of one of `MEASUREMENTS`."""
-    make, networks, version = MEASUREMENTS[name]
-    return pipeline.measure(name, make, networks, version)
-
-
 CLAIMS = (
     Claim(
         "C1",
@@ -350,7 +363,7 @@ CLAIMS = (
             Limit("nrmse", "error on held-out windows, in standard deviations of the true signal", high="allowed_nrmse", decides=WHOLE),
             Limit("nrmse", "the same error, compared with that of ridge regression", high="ridge_nrmse", decides=OURS),
         ),
-        functools.partial(measured, "enhancement"),
+        enhancement,
     ),
     Claim(
         "C2",
@@ -364,7 +377,7 @@ CLAIMS = (
             Limit("ratio_to_simulator", "time divided by that of a battery's coarse simulator, timed in its study", high=2, decides=WHOLE),
             Limit("ratio_to_formula", "time divided by that of the square waves, one line of NumPy", high=2, decides=OURS),
         ),
-        functools.partial(measured, "speed"),
+        speed,
         margin=20.0,
     ),
     Claim(
@@ -418,7 +431,7 @@ CLAIMS = (
             Limit("rank_ratio", "effective rank divided by that of real noise", low=0.8, decides=WHOLE),
             Limit("auc", "AUC of a classifier, compared with real noise 10 % louder", high="allowed_auc", decides=WHOLE),
         ),
-        functools.partial(measured, "noise resemblance"),
+        noise_resemblance,
     ),
     Claim(
         "C7",
@@ -432,7 +445,7 @@ CLAIMS = (
             Limit("roughness_ratio", "standard deviation of first differences divided by the real one", low=0.8, high=1.25),
             Limit("auc", "AUC of a classifier, compared with telemetry 10 % larger", high="allowed_auc", decides=WHOLE),
         ),
-        functools.partial(measured, "sum resemblance"),
+        sum_resemblance,
     ),
     Claim(
         "C8",
@@ -457,7 +470,7 @@ CLAIMS = (
             Limit("share_of_modes", "share of degraded modes with at most twice the nominal error", low=0.5),
             Limit("share_of_modes", "share of degraded modes with at most twice the nominal error", low=1.0, decides=WHOLE),
         ),
-        functools.partial(measured, "degraded"),
+        degraded_errors,
         is_tested=False,
     ),
 )

@@ -5,7 +5,6 @@ readers who cannot see it. Figures 1 and 11 are drawings that are kept beside th
 in the paper, have counterparts: real and generated windows in random order.
 """
 
-import dataclasses
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -37,48 +36,26 @@ from enhsim_tf.common.plot_style import (
     panels,
     title_words,
 )
-from enhsim_tf.paper.claims import measured
+from enhsim_tf.paper.claims import enhancement, noise_resemblance
 from enhsim_tf.paper.enhancer import build_enhancer
 from enhsim_tf.paper.noise import build_discriminator, build_generator, extract_noise
 from enhsim_tf.paper.pipeline import Pipeline
 
 DRAWINGS = Path(__file__).with_name("drawings")
-KINDS = ("png", "svg")
 LETTERS = "abcdefgh"
 COUNTERPART = "A counterpart of a face in the paper, which another system made."
 FACTS = {"time_unit": "min", "unit": "dimensionless"}  # of all axes that show windows
 
-
-@dataclasses.dataclass(frozen=True)
-class PaperFigure(Figure):
-    """A figure of the paper, which `drawn_by` draws from a pipeline; None for a drawing that is kept.
-
-    Args:
-        needs_training: Whether it shows a trained network.
-    """
-
-    needs_training: bool = True
+FIGURES: dict[str, Figure] = {}
+"""All figures by name, in the order of their numbers."""
+Draw = Callable[[Pipeline], matplotlib.figure.Figure | None]
 
 
-FIGURES: dict[str, PaperFigure] = {
-    "fig01_pipeline": PaperFigure(
-        1,
-        "Enhanced simulation pipeline",
-        "Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector through the generator to noise; their "
-        "sum is the final output beside real telemetry. Telemetry trains the enhancer, and its noise trains the GAN.",
-        None,
-        needs_training=False,
-    )
-}
-"""All figures by name; `paper_figure` adds those that a function draws."""
-Draw = Callable[[Pipeline], matplotlib.figure.Figure]
-
-
-def paper_figure(name: str, title: str, needs_training: bool = False) -> Callable[[Draw], Draw]:
-    """Makes a function that draws a figure one of `FIGURES`."""
+def paper_figure(name: str, title: str) -> Callable[[Draw], Draw]:
+    """Makes a function one of `FIGURES`. The function draws the figure, or only describes a drawing that is kept."""
 
     def add(draw: Draw) -> Draw:
-        FIGURES[name] = PaperFigure(int(name[3:5]), title, " ".join(draw.__doc__.split()), draw, needs_training)
+        FIGURES[name] = Figure(int(name[3:5]), title, " ".join(draw.__doc__.split()), draw)
         return draw
 
     return add
@@ -88,6 +65,13 @@ def sample(pipeline: Pipeline, part: str, number: int, purpose: str) -> dict[str
     """Some windows of a part, and the minutes since the beginning of each as `minutes`."""
     drawn = pipeline.windows(part, number, purpose)
     return drawn | {"minutes": pipeline.telemetry.interval / 60 * np.arange(pipeline.settings.window)}
+
+
+@paper_figure("fig01_pipeline", "Enhanced simulation pipeline")
+def pipeline_diagram(pipeline: Pipeline) -> None:
+    """Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector through the generator to noise; their
+    sum is the final output beside real telemetry. Telemetry trains the enhancer, and its noise trains the GAN.
+    """
 
 
 @paper_figure("fig02_source_target", "Training source and target time series")
@@ -113,12 +97,12 @@ def enhancer_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return layer_table(build_enhancer(pipeline.settings), "The enhancer is wide and shallow")
 
 
-@paper_figure("fig04_enhanced_simulation", "Enhanced simulation", needs_training=True)
+@paper_figure("fig04_enhanced_simulation", "Enhanced simulation")
 def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """A held-out window: the stepped simulation, the enhanced signal and the true signal; below, the difference of the last two."""
     window = sample(pipeline, "test", 1, "figure 4")
     enhanced, truth = pipeline.enhance(window["coarse"])[0], window["truth"][0]
-    errors = measured("enhancement", pipeline)
+    errors = enhancement(pipeline)
     words = ", ".join(f"{name} {errors[f'{key}nrmse']:.3f}" for name, key in (("coarse", "coarse_"), ("enhanced", ""), ("ridge", "ridge_")))
     figure, down = new_sheet(
         DOUBLE,
@@ -159,7 +143,7 @@ def guess(
     return figure
 
 
-@paper_figure("fig05_real_or_generated", "Real or generated: windows of telemetry (a counterpart)", needs_training=True)
+@paper_figure("fig05_real_or_generated", "Real or generated: windows of telemetry (a counterpart)")
 def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Eight windows of telemetry in random order; four are generated."""
     rng, real = pipeline.draw("figure 5"), sample(pipeline, "test", 4, "figure 5, real")
@@ -167,16 +151,16 @@ def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return guess("Which windows of telemetry are generated?", real["minutes"], real["target"], generated, rng)
 
 
-@paper_figure("fig06_real_or_generated_noise", "Real or generated: windows of noise (a counterpart)", needs_training=True)
+@paper_figure("fig06_real_or_generated_noise", "Real or generated: windows of noise (a counterpart)")
 def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Eight windows of noise in random order; four are generated."""
-    rng, found = pipeline.draw("figure 6"), measured("noise resemblance", pipeline)
+    rng, found = pipeline.draw("figure 6"), noise_resemblance(pipeline)
     real, minutes = pipeline.noise_windows("test", 4, "figure 6, real"), sample(pipeline, "test", 1, "figure 6")["minutes"]
     hint = f"effective rank: generated {found['rank']:.0f}, real {found['real_rank']:.0f}"
     return guess("Which windows of noise are generated?", minutes, real, pipeline.generate_noise(4, rng), rng, hint)
 
 
-@paper_figure("fig07_real_or_generated_series", "Real or generated: longer series (a counterpart)", needs_training=True)
+@paper_figure("fig07_real_or_generated_series", "Real or generated: longer series (a counterpart)")
 def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Four longer series in random order; two are generated."""
     rng, size = pipeline.draw("figure 7"), pipeline.settings.window
@@ -227,17 +211,14 @@ def discriminator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return layer_table(build_discriminator(pipeline.settings), "A window is narrowed to one probability")
 
 
-FIGURES["fig11_gan_training"] = PaperFigure(
-    11,
-    "GAN training",
-    "Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and generated rows, labelled 0. Then the "
-    "generator learns through the frozen discriminator, with the label reversed to 1.",
-    None,
-    needs_training=False,
-)
+@paper_figure("fig11_gan_training", "GAN training")
+def gan_training(pipeline: Pipeline) -> None:
+    """Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and generated rows, labelled 0. Then the
+    generator learns through the frozen discriminator, with the label reversed to 1.
+    """
 
 
-@paper_figure("fig12_accuracy_loss", "Accuracy and loss for real and fake classifications", needs_training=True)
+@paper_figure("fig12_accuracy_loss", "Accuracy and loss for real and fake classifications")
 def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Accuracy and loss of the discriminator on real and on generated rows over the iterations, beside chance."""
     history, last = pipeline.history, pipeline.settings.iterations
@@ -267,7 +248,7 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     return figure
 
 
-@paper_figure("fig13_combined", "Simulator output, enhanced, with noise added", needs_training=True)
+@paper_figure("fig13_combined", "Simulator output, enhanced, with noise added")
 def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """The stepped simulation with the enhanced signal, the enhanced signal with generated noise, and real telemetry of the same time."""
     window, rng = sample(pipeline, "test", 1, "figure 13"), pipeline.draw("figure 13, noise")
@@ -355,10 +336,10 @@ def layer_details(layer: keras.layers.Layer) -> str:
 
 
 def save_figure(name: str, pipeline: Pipeline, folder: Path, caption: str, is_smoke: bool = False) -> None:
-    """Writes one of `FIGURES` as PNG and SVG; see `common.figure.save`."""
-    if FIGURES[name].drawn_by is not None:
-        save(name, pipeline, folder, caption, is_smoke, figures=FIGURES)
-        return
-    for kind in KINDS:
-        with replace_file(folder / f"{name}.{kind}") as temporary:
-            shutil.copyfile(DRAWINGS / f"{name}.{kind}", temporary)
+    """Writes one of `FIGURES` as PNG and SVG: copies a kept drawing, or draws it; see `common.figure.save`."""
+    drawings = list(DRAWINGS.glob(f"{name}.*"))
+    if not drawings:
+        save(FIGURES[name], name, pipeline, folder, caption, is_smoke)
+    for drawing in drawings:
+        with replace_file(folder / drawing.name) as temporary:
+            shutil.copyfile(drawing, temporary)

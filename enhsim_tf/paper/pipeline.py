@@ -1,11 +1,10 @@
 """Figure 1: the pipeline, "steps involved in the process" 1 to 9 and "Combined", each kept as a stage.
 
-Nothing is computed before it is asked for, so the figures without networks are drawn before any training.
+Nothing is computed before it is asked for, so a figure trains only the networks that it shows.
 """
 
 import functools
 import zlib
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +28,6 @@ from enhsim_tf.paper.telemetry import (
     true_signal,
 )
 
-VERSION = {"telemetry": 1, "enhancer": 1, "noise GAN": 1}
-"""Raised when the code of a stage gives other results for the same settings."""
 FOLLOWED = 200  # generated windows whose statistics are followed in training
 
 
@@ -51,7 +48,7 @@ class Pipeline:
         # 1: construct lightweight, high-speed simulations
         self.simulator = square_wave.simulator(settings)
         self.truth = true_signal(settings)
-        self._measured: dict[str, dict[str, float]] = {}
+        self.measured: dict[str, dict[str, float]] = {}  # what `claims` measured of it, by stage
 
     def draw(self, purpose: str) -> np.random.Generator:
         """The random generator of one purpose. Draws for one purpose do not change those for another."""
@@ -62,7 +59,7 @@ class Pipeline:
     @functools.cached_property
     def telemetry(self) -> Telemetry:
         """The telemetry, read back from the store."""
-        folder = self.stages.run("telemetry", self._make_telemetry, self.telemetry_settings, version=VERSION["telemetry"])
+        folder = self.stages.run("telemetry", self._make_telemetry, self.telemetry_settings)
         kept = ParquetStore(folder / "telemetry.parquet")
         if self.store is None:
             return kept.read()
@@ -118,7 +115,7 @@ class Pipeline:
         """Folder of the trained enhancer and its history."""
         _ = self.telemetry
         depends = self.settings.of("windows", "enhancer")
-        return self.stages.run("enhancer", self._train_enhancer, depends, ["telemetry"], VERSION["enhancer"])
+        return self.stages.run("enhancer", self._train_enhancer, depends, ["telemetry"])
 
     def _train_enhancer(self, folder: Path) -> None:
         train = self.windows("train", self.settings.num_windows, "training windows")
@@ -155,7 +152,7 @@ class Pipeline:
         """Folder of both networks after the paper's number of iterations, and of the history, which goes on beyond it."""
         _ = self.telemetry
         depends = self.settings.of("windows", "noise", "noise GAN")
-        return self.stages.run("noise GAN", self._train_gan, depends, ["telemetry"], VERSION["noise GAN"])
+        return self.stages.run("noise GAN", self._train_gan, depends, ["telemetry"])
 
     def _train_gan(self, folder: Path) -> None:
         chosen = self.settings
@@ -201,18 +198,6 @@ class Pipeline:
     def combine(self, coarse: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """The final signal: enhanced windows, "summed with the noise-generating neural network"."""
         return self.enhance(coarse) + self.generate_noise(len(coarse), rng)
-
-    # -- what claims ask for -------------------------------------------------------------------------------------------
-
-    def measure(self, name: str, make: Callable[["Pipeline"], dict[str, float]], networks: Sequence[str], version: int) -> dict[str, float]:
-        """Measurements that `make` makes of the pipeline and its networks (`enhancer`, `noise GAN` or both), kept as a stage."""
-        if name not in self._measured:
-            for network in networks:
-                _ = self.enhancer_folder if network == "enhancer" else self.gan_folder
-            depends = self.settings.of("windows", "noise", "claims")
-            folder = self.stages.run(name, lambda folder: save_arrays(folder, make(self)), depends, ["telemetry", *networks], version)
-            self._measured[name] = {key: float(value) for key, value in load_arrays(folder).items()}
-        return self._measured[name]
 
 
 def _load(network: keras.Sequential, weights: Path) -> keras.Sequential:

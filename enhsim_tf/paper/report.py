@@ -5,6 +5,7 @@ which rests on many seeds and several readings, the verdict of this run, and the
 """
 
 import base64
+import dataclasses
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.stages import VERSIONS
 from enhsim_tf.paper.claims import NOT_MEASURED, NOT_REPRODUCED, OF_UNTESTED, PARTLY, REPRODUCED
 from enhsim_tf.paper.figures import FIGURES
-from enhsim_tf.paper.settings import Settings, decisions
+from enhsim_tf.paper.settings import Settings
 
 PUBLISHED = Path(__file__).with_name("published.json")
 UNDECIDED = "undecided"
@@ -67,6 +68,19 @@ def as_text(rows: Sequence[Mapping[str, str]]) -> str:
     lines = [[name.ljust(width) for name, width in widths.items()], ["-" * width for width in widths.values()]]
     lines += [[row[name].ljust(width) for name, width in widths.items()] for row in rows]
     return "\n".join("  ".join(line).rstrip() for line in lines)
+
+
+def decisions(settings: Settings | None = None) -> list[Mapping[str, str]]:
+    """The table of decisions: for each setting its value, what paper and author say, the source, and the reason."""
+    settings, rows = settings or Settings(), []
+    for field in dataclasses.fields(Settings):
+        about, value = field.metadata, getattr(settings, field.name)
+        number = {True: "yes", False: "no"}[value] if isinstance(value, bool) else value if isinstance(value, str) else f"{value:,g}"
+        if isinstance(value, int) and not isinstance(value, bool):
+            number = f"{value:,}"
+        words = {key: about[key] for key in ("paper", "author", "source", "why")}
+        rows.append({"setting": field.name, "value": f"{number} {about['unit']}".strip(), **words})
+    return rows
 
 
 def results(

@@ -5,7 +5,6 @@ Keras' default; a choice of this project needs a reason. The smoke budget change
 """
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 from enhsim_tf.common.errors import InputError
@@ -163,16 +162,3 @@ def _converted(field: dataclasses.Field, value: Any) -> Any:
         }.get(kind, "a word")
         raise InputError(f"Expected {field.name} to be {expected}. Received: {value!r}.") from None
     return converted
-
-
-def decisions(settings: Settings | None = None) -> list[Mapping[str, str]]:
-    """The table of decisions: for each setting its value, what paper and author say, the source, and the reason."""
-    settings, rows = settings or Settings(), []
-    for field in dataclasses.fields(Settings):
-        about, value = field.metadata, getattr(settings, field.name)
-        number = {True: "yes", False: "no"}[value] if isinstance(value, bool) else value if isinstance(value, str) else f"{value:,g}"
-        if isinstance(value, int) and not isinstance(value, bool):
-            number = f"{value:,}"
-        words = {key: about[key] for key in ("paper", "author", "source", "why")}
-        rows.append({"setting": field.name, "value": f"{number} {about['unit']}".strip(), **words})
-    return rows

@@ -69,4 +69,5 @@ def run_study(
 
 def save_all(figures: Mapping[str, Figure], found: Mapping[str, Any], folder: Path, command: str) -> list[Path]:
     """Draws the figures of a study by name from its findings, with its command as the caption, and returns the files in the folder."""
-    return [path for name in figures for path in save(name, found, folder, command, found["budget"] == "smoke", figures=figures)]
+    is_smoke = found["budget"] == "smoke"
+    return [path for name, figure in figures.items() for path in save(figure, name, found, folder, command, is_smoke)]

@@ -59,12 +59,10 @@ def draw(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     return figure
 
 
-PICTURE = {
-    "channel": Figure(
-        17,
-        "A real channel",
-        "Three panels over time. Left: a channel that rises and falls, with the enhanced signal upon it. Middle: the same at a lower level and "
-        "with a smaller amplitude. Right: the channel holds one value for most of a cycle, and the enhanced signal goes on.",
-        draw,
-    )
-}
+PICTURE = Figure(
+    17,
+    "A real channel",
+    "Three panels over time. Left: a channel that rises and falls, with the enhanced signal upon it. Middle: the same at a lower level and "
+    "with a smaller amplitude. Right: the channel holds one value for most of a cycle, and the enhanced signal goes on.",
+    draw,
+)

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
 
     found = run_study("spacecraft", tables_of, channels, options, settings, out, {"skipped": skipped})
     if set(channels) - set(skipped) >= {CHANNEL}:
-        save("channel", stretches(load_channel(options.data, CHANNEL)), out, KEPT.command, settings.budget == "smoke", figures=PICTURE)
+        save(PICTURE, "channel", stretches(load_channel(options.data, CHANNEL)), out, KEPT.command, settings.budget == "smoke")
     return found
 
 

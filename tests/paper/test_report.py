@@ -77,6 +77,10 @@ def test_every_figure_and_every_claim_is_on_the_page(page):
     assert all(claim.sentence in words for claim in CLAIMS) and "0.0421" in words
 
 
+def test_figures_are_in_the_order_of_their_numbers():
+    assert [about.number for about in FIGURES.values()] == list(range(1, 15))
+
+
 def test_hostile_names_are_escaped(folder, page):
     hostile = read(folder, found_of(HOSTILE))
     assert [tag for tag, _ in hostile.tags] == [tag for tag, _ in read(folder, found_of("plain")).tags]

@@ -3,7 +3,8 @@ import zlib
 
 import pytest
 
-from enhsim_tf.paper.settings import AUTHOR, OURS, PAPER, Settings, decisions, make_settings
+from enhsim_tf.paper.report import decisions
+from enhsim_tf.paper.settings import AUTHOR, OURS, PAPER, Settings, make_settings
 
 FIELDS = dataclasses.fields(Settings)
 

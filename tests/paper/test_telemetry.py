@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.paper.square_wave import MODES, degrade, simulator, square_wave
+from enhsim_tf.paper.degraded import MODES, degrade
+from enhsim_tf.paper.square_wave import simulator, square_wave
 from enhsim_tf.paper.telemetry import ParquetStore, Telemetry, make_telemetry, random_starts, split, true_signal
 from tests.paper.conftest import tiny_settings
 
