@@ -3,13 +3,12 @@
 #
 # **Question:** how do a crude simulator and two networks make telemetry?
 #
-# - **After this lesson** you can name the nine steps of the paper, compute a window of telemetry step by step, and say what the pipeline
-#   assumes about noise.
+# - **After this lesson** you can name the nine steps of the paper, and compute a window of telemetry step by step.
 # - **You should know** nothing in particular; every step has a lesson of its own.
-# - **Terms:** *coarse simulator*: a simple model, here a sum of square waves. *Enhancer*: the network that turns square waves into a
-#   waveform. *Generator*: the network that turns random numbers, the *latent vector*, into noise. *GAN*: the generator together with the
-#   network that trains it. *Moving average*: the mean of the samples around each sample. *Nominal*: without a fault. *Degraded mode*: a
-#   fault, here a satellite that gets stuck and no longer turns.
+# - **Terms:** *telemetry*: the measurements that a vehicle sends. *Window*: here 500 samples in a row. *Coarse simulator*: a simple model,
+#   here a sum of square waves. *Enhancer*: the network that turns square waves into a waveform. *Generator*: the network that turns random
+#   numbers, the *latent vector*, into noise. *GAN*: the generator together with the network that trains it. *Moving average*: the mean of
+#   the samples around each sample. *Nominal*: without a fault.
 #
 # **What the paper says** (section 2): nine numbered steps, whose results "are then combined to produce the final, high-fidelity
 # output". Two networks are trained apart: one makes the waveform, one makes the noise.
@@ -32,7 +31,8 @@ show(pipeline, "fig01_pipeline")
 # ## Step by step
 #
 # Both networks are plain Keras models. They learn from telemetry of a vehicle or a fine simulator (step 4): the enhancer from the
-# telemetry, the generator from the noise that is left when a moving average is subtracted (step 6). Then a window needs seven lines:
+# telemetry, the generator from the noise that is left when a moving average is subtracted (step 6). The example is a satellite with an
+# orbit of 480 s and a rotation of 120 s, whose amplitudes are 0.5 and 0.25. A window needs seven lines:
 
 # %%
 enhancer, generator = pipeline.enhancer, pipeline.generator
@@ -68,11 +68,11 @@ with drawing(alt, 4, 1.6, title, sharey=True) as panels:
     for panel, (name, (windows, color)) in zip(panels, parts.items()):
         panel.plot(windows[0], color=color, linewidth=0.7)
         panel.set(title=name, xlabel="time (s)")
-    panels[0].set_ylabel("value")
+    panels[0].set_ylabel("value (dimensionless)")
 
 # %% [markdown]
-# *What to see:* in Figure 1, waveform (5) and noise (9) meet only at the plus. A satellite that got stuck therefore gets the same noise as
-# a healthy one from the same seed:
+# *What to see:* only the last panel holds the work of both networks. A satellite that got stuck and no longer turns therefore gets the same
+# noise as a healthy one from the same seed:
 
 # %%
 added = {}
@@ -86,27 +86,25 @@ say(
 assert difference < 1e-5
 
 # %% [markdown]
-# The paper promises speed (C2). One of its limits is the speed of all steps together, on the machine of this run; the
-# [report](../docs/report.md) has the others.
+# The paper promises speed (C2). The limits are about time; nobody measured memory. Two of them compare with simulators of a
+# [battery](../studies/battery/README.md).
 
 # %%
 claim("C2")
-(record,) = verdict(pipeline, "C2", limits=False)
-rate = record["measured"]["times_real_time"]
-say(f"One second of computing makes **{rate / 1e6:.1f} million** seconds of telemetry.")
-assert rate > 10_000
+_ = verdict(pipeline, "C2")
 
 # %% [markdown]
 # `python -m enhsim_tf.reproduce --telemetry my.csv` runs these steps on telemetry of your own.
 #
-# **Answer.** One network turns square waves into a waveform, another turns random numbers into noise, and the two are added. Whether the
-# result is realistic is the question of notebooks 05 and 13, and whether the waveform of a fault is right, of notebook 23.
+# **Answer.** One network turns square waves into a waveform, another turns random numbers into noise, and the two are added, much faster
+# than real time. Whether the result is realistic is the question of notebooks 05 and 13, and whether the waveform of a fault is right, of
+# notebook 23.
 #
 # ## Exercises
 #
-# **1.** A detector needs days, not windows. The next cell puts 100 generated windows of noise end to end on the enhanced signal, as figure
-# 7 does. Are the edges of the windows visible in the series? Complete the function: the mean size of the step from sample to sample, at
-# each of the 500 places within a window.
+# **1.** A detector needs days, not windows. The next cell puts generated windows of noise end to end on the enhanced signal. Are the edges
+# of the windows visible in the series? Complete the function: the mean size of the step from sample to sample, at each of the 500 places
+# within a window. Then plot it for both series: where should an edge show?
 
 # %%
 window = pipeline.settings.window

@@ -54,8 +54,7 @@ np.testing.assert_array_equal(simulator(time_s), coarse)
 np.testing.assert_allclose(pipeline.simulator(time_s), coarse)
 
 # %% [markdown]
-# Training pairs are windows of 500 samples, cut from the telemetry at random times. The source is simulated for exactly the same times:
-# without this alignment, a network would learn the mean over all shifts, which is flat.
+# Training pairs are windows of 500 samples, cut from the telemetry at random times. The source is simulated for exactly the same times.
 
 # %%
 show(pipeline, "fig02_source_target")
@@ -92,7 +91,7 @@ assert abs(error - closed_form) < 0.01
 
 # %%
 x = np.linspace(0, 1, 100_001)
-alt = "The mean square error of a square wave for a sine, by the height of the square wave"
+alt = "The NRMSE of a square wave for a sine, by the height of the square wave"
 best_height = 2 / np.pi
 title = f"The best square wave has {best_height:.2f} of the height of the sine"
 heights = np.linspace(0, 1.2, 121)
@@ -108,8 +107,8 @@ with drawing(alt, 2, 2.1, title) as panels:
     panels[1].set(xlabel="height of the square wave (amplitudes)", ylabel="NRMSE", ylim=(0, None))
 
 # %% [markdown]
-# *What to see:* the error has its minimum where the height is the mean of the sine over half a period, $2/\pi$. An enhancer that can
-# rescale its input need not care about the height: *when* the levels switch is what matters.
+# *What to see:* the error has its minimum where the height is the mean of the sine over half a period, $2/\pi$. Rescaling the levels cannot
+# bring the error below this minimum; the rest is shape.
 
 # %%
 say(f"The error on the right is smallest at a height of **{heights[np.argmin(by_height)]:.2f}**.")
@@ -132,7 +131,7 @@ assert distinct == 480
 # times, not other inputs. A real channel, whose period is no whole number of samples, may be harder.
 #
 # **Answer.** The simulator knows *when* each of the two sines changes its sign and how high it rises, and nothing of what lies between: its
-# error is 0.67 standard deviations of the signal.
+# error is 0.67 standard deviations of the signal. It can produce only 480 different windows.
 #
 # ## Exercises
 #
@@ -157,9 +156,7 @@ check_answer(
 
 
 # %%
-def num_distinct(
-    orbit_s, rotation_s
-): ...  # your code: an argument in whole numbers, or a count as above over 200,000 samples
+def num_distinct(orbit_s, rotation_s): ...  # your code: an argument in whole numbers
 
 
 # %%

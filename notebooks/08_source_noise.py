@@ -116,7 +116,7 @@ piece = values[: 500 + 2 * margin]
 
 def draw(width):
     half, extracted = width // 2, extract(values[:100_000], width)
-    title = f"Width {width}: a standard deviation of {extracted.std():.3f}; {true_sd} was put in"
+    title = f"Width {width} leaves a standard deviation of {extracted.std():.3f}; {true_sd} was put in"
     with drawing(
         f"Telemetry, its moving average over {width} samples, and the rest", 2, 1.9, title
     ) as panels:
@@ -147,7 +147,7 @@ with drawing(alt, height=2.1, title=title) as panel:
     panel.axhline(true_sd, color=QUIET, linestyle=":", label="put in")
     panel.set(
         xlabel="width of the moving average (samples)",
-        ylabel="sd of the noise",
+        ylabel="sd of the noise (dimensionless)",
         xlim=(0, 122),
     )
     panel.legend(frameon=False)
@@ -157,8 +157,8 @@ assert np.abs(measured / predicted - 1).max() < 0.03
 # ## The filter leaves a mark
 #
 # White noise was put in, but what comes out is not quite white, because near samples share most of the average that was subtracted. For a
-# lag $k$ up to half the width, the covariance of the noise alone is $-\sigma^2\,(w+k)/w^2$; beyond that it is $\sigma^2\,(w-k)/w^2$, hence
-# the step. The remains of the waves add a little at all lags.
+# lag $k$ up to half the width, the covariance of the noise alone is $-\sigma^2\,(w+k)/w^2$; beyond that, up to the width, it is
+# $\sigma^2\,(w-k)/w^2$, hence the step, and then 0. The remains of the waves add a little at all lags.
 
 # %%
 lags = np.arange(1, 40)
@@ -168,13 +168,13 @@ of_waves = left**2 / 2 @ np.cos(2 * np.pi * lags / periods[:, None])
 closed_form = (of_noise + of_waves) / predicted_sd(width) ** 2
 
 centred = noise[:100_000] - noise[:100_000].mean()
-measured = np.array([np.mean(centred[:-lag] * centred[lag:]) for lag in lags]) / centred.var()
+correlations = np.array([np.mean(centred[:-lag] * centred[lag:]) for lag in lags]) / centred.var()
 
 alt = "Correlation of the extracted noise with itself by lag, measured and in closed form"
 title = "Extracted noise is not white: near samples are negatively correlated"
 with drawing(alt, height=2.1, title=title) as panel:
     panel.plot(lags, closed_form, color=AVERAGE, linestyle=DASHED, label="closed form")
-    panel.plot(lags, measured, "o", color=REAL, markersize=2.5, label="measured")
+    panel.plot(lags, correlations, "o", color=REAL, markersize=2.5, label="measured")
     panel.axhline(0, color=QUIET, linewidth=0.5)
     panel.set(xlabel="lag (samples; one sample is 1 s)", ylabel="correlation")
     panel.legend(frameon=False)
@@ -184,8 +184,8 @@ with drawing(alt, height=2.1, title=title) as panel:
 # next lessons learn from this noise, and have to learn this mark too.
 
 # %%
-say(f"Lag 1: **{measured[0]:.3f}** measured, **{closed_form[0]:.3f}** computed.")
-assert np.abs(measured - closed_form).max() < 0.01
+say(f"Lag 1: **{correlations[0]:.3f}** measured, **{closed_form[0]:.3f}** computed.")
+assert np.abs(correlations - closed_form).max() < 0.01
 
 # %% [markdown]
 # **Answer.** Subtract a moving average that is many samples wide, but short against the fastest signal. What is
@@ -218,16 +218,14 @@ for t in range(1, len(slow)):
     slow[t] = 0.998 * slow[t - 1] + 0.1 * np.sqrt(1 - 0.998**2) * kicks[t]
 
 
-def surviving_share(
-    series, width
-): ...  # your code: the standard deviation after the extraction, divided by that of the series
+def surviving_share(series, width): ...  # your code
 
 
 # %%
 check_answer(
     surviving_share(slow, 25),
     lambda share: abs(share - answers_paper.share_of_sd(slow, 25)) < 1e-3,
-    "Use extract(series, width).",
+    "What is left of a series by the filter of this lesson?",
 )
 
 # %% [markdown]

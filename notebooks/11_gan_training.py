@@ -99,8 +99,8 @@ def train_step(real, latent, latent_again):
 # ## The same numbers as the package
 #
 # `NoiseGAN` in `enhsim_tf/paper/noise.py` is a Keras model with this step. Both start from the same weights and get the same rows and
-# latent vectors; without dropout, whose draws would differ. After five iterations Adam has moved weights by up to 0.005. Rounding is
-# magnified by Adam, which divides small gradients by their own size; the tolerance is a fifth of that movement.
+# latent vectors; without dropout, whose draws would differ. Adam moves a weight by about its learning rate of 0.001 an iteration. Rounding
+# is magnified by Adam, which divides small gradients by their own size; the tolerance after five iterations is one such step.
 
 # %%
 import dataclasses
@@ -136,7 +136,7 @@ for ours, theirs in ((a, b) for pair in pairs for a, b in zip(*(model.get_weight
 # ## Training, and the noise forming
 #
 # From here on with dropout, the loop goes on to the paper's number of iterations. Every 20 iterations, we keep what the generator makes
-# of the same 500 latent vectors.
+# of the same 500 latent vectors. The *size* of noise is its standard deviation.
 
 # %%
 for drop in drops:
@@ -308,7 +308,7 @@ check_answer(
 #     return float(error)
 # ```
 #
-# Two updates are two steps of Adam in an iteration, so it takes twice as many. The paper speaks of one batch; the
-# author's public code takes two. `python -m enhsim_tf.reproduce --set "update=two of 200"` shows what it changes.
+# The discriminator then takes two steps of Adam in an iteration, and the generator one. The paper speaks of one batch; the author's
+# public code takes two. `python -m enhsim_tf.reproduce --set "update=two of 200"` shows what it changes.
 #
 # </details>

@@ -120,8 +120,8 @@ for rate in (0.01, 0.05, 0.3):
 # ## The test
 #
 # Five kinds of nominal windows train one detector each. Each threshold is set for 1 % on held-out windows of the *same* kind. Then all
-# watch real nominal telemetry of a later time, and telemetry with a fault, a drift. A kind of data that is good enough gives about 1 % of
-# false alarms there, too, and a high recall.
+# watch real nominal telemetry of a later time, and telemetry with a [drift](../docs/glossary.md#degraded-mode-severity-onset) of severity
+# 0.1 as a fault. A kind of data that is good enough gives about 1 % of false alarms there, too, and a high recall.
 
 # %%
 noise_sd = pipeline.noise_windows("train", pipeline.settings.num_windows, "noise windows").std(dtype=float)
@@ -169,19 +169,20 @@ with drawing(alt, height=1.9, title=title) as panel:
 # *What to see:* the detector that was trained on the paper's sum is as useless as the one that was trained without noise, although a plot
 # shows hardly any difference to telemetry. After Gaussian noise of the same standard deviation, which takes one line, it alarms about as
 # seldom as after real data, and both find the drift in every window, so that a smaller one would be needed to compare them. After *coarse*
-# it alarms never, because its threshold lies above the scores of all real windows. (Rates differ a little between notebooks, which draw
-# other windows.)
+# it never alarms, because its threshold lies above the scores of all real windows; it finds no drift either. (Rates differ a little
+# between notebooks, which draw other windows.)
 
 # %%
 say("False alarms: " + ", ".join(f"{kind} **{rate:.1%}**" for kind, rate in rates.items()) + ".")
 good = ["enhanced + Gaussian noise", "real"]
-say("Recall: " + ", ".join(f"{kind} **{recalls[kind]:.0%}**" for kind in good) + ".")
+say("Recall: " + ", ".join(f"{kind} **{recalls[kind]:.0%}**" for kind in rates) + ".")
 largest = scores_of_real["coarse"].max()
 say(f"*Coarse*: threshold **{limits['coarse']:.3f}**, largest score of a real window **{largest:.3f}**.")
 if budget == "full":
     assert rates["enhanced"] > 0.9 and rates["enhanced + GAN noise"] > 0.9
     assert rates["enhanced + Gaussian noise"] < 0.05 and rates["real"] < 0.05
-    assert limits["coarse"] > largest and abs(recalls[good[0]] - recalls[good[1]]) < 0.1
+    assert limits["coarse"] > largest and recalls["coarse"] < 0.05
+    assert abs(recalls[good[0]] - recalls[good[1]]) < 0.1
 
 # %% [markdown]
 # The paper says itself that the signal without noise is too clean (C3). Its verdict rests on three detectors:
@@ -219,14 +220,15 @@ draws = np.random.default_rng(0).standard_normal((2, *enhanced[0].shape))
 
 
 def scores_at(scale):
-    training, calibration = (windows + scale * noise_sd * draw for windows, draw in zip(enhanced, draws))
+    training, calibration = (windows + scale * noise_sd * white for windows, white in zip(enhanced, draws))
     model = fit_pca(training)
-    return residual(model, calibration), residual(model, real)
+    own = residual(model, calibration)
+    limit = min(conformal_threshold(own, 0.01), own.max())  # few windows, as at smoke budget, allow no 1 %
+    return own, residual(model, real), limit
 
 
 def draw(scale):
-    own, of_real = scores_at(scale)
-    limit = min(conformal_threshold(own, 0.01), own.max())  # few windows, as at smoke budget, allow no 1 %
+    own, of_real, limit = scores_at(scale)
     title = f"{scale} times the real noise: {np.mean(of_real > limit):.1%} of real windows raise an alarm"
     bins = np.linspace(0.006, 0.019, 120)
     with drawing(f"Scores with noise of {scale} times the real scale", height=1.6, title=title) as panel:
@@ -246,8 +248,8 @@ slider(draw, "noise's scale", [0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.25], shown=(1.
 # %%
 share = {}
 for scale in (0.9, 1.0, 1.25):
-    own, of_real = scores_at(scale)
-    share[scale] = np.mean(of_real > conformal_threshold(own, 0.01))
+    _, of_real, limit = scores_at(scale)
+    share[scale] = np.mean(of_real > limit)
 say(
     "Alarms: "
     + ", ".join(f"**{rate:.1%}** at {scale}" for scale, rate in share.items())
@@ -275,12 +277,13 @@ check_answer(
 
 # %% [markdown]
 # **2.** Too much noise gives few false alarms. What does it cost? Complete the function with the recall of the drift, `faulty`, for a
-# detector trained with noise of a given scale.
+# detector trained with noise of a given scale. Its threshold is set for 5 %, so that few windows
+# are enough.
 
 
 # %%
 def recall_at(scale):
-    training, calibration = (windows + scale * noise_sd * draw for windows, draw in zip(enhanced, draws))
+    training, calibration = (windows + scale * noise_sd * white for windows, white in zip(enhanced, draws))
     # your code: fit the detector, set a threshold for 5 %, and return the recall of `faulty`
     return None
 
@@ -321,7 +324,7 @@ check_answer(
 #
 # ```python
 # def recall_at(scale):
-#     training, calibration = (windows + scale * noise_sd * draw for windows, draw in zip(enhanced, draws))
+#     training, calibration = (windows + scale * noise_sd * white for windows, white in zip(enhanced, draws))
 #     model = fit_pca(training)
 #     limit = conformal_threshold(residual(model, calibration), 0.05)
 #     return np.mean(residual(model, faulty) > limit)
