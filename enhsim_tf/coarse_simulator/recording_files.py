@@ -93,6 +93,8 @@ def read_recording(
         notes.append(f"{name}: gaps, at which the run is split into {len(shared)} parts")
     used, offset_s = (*names, given[names[0]].index.name), 0.0 if has_time else base / 1e9
     others = [each for each in (() if table is None else table) if each not in used and not each.startswith(("column ", "Unnamed: "))]
+    if others and (inside := given[names[0]].attrs["places"].rows) is not None:  # the table holds several series
+        table = table.iloc[inside]
     parts = []
     for begin, end in shared:
         rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(begin, end), cleaning) if others else []
@@ -176,7 +178,7 @@ def _begin_ns(part: Telemetry) -> int:
 
 
 def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning) -> np.ndarray:
-    """Returns, for each grid point, the number of the source's row that is nearest in time."""
+    """Returns, for each grid point, the number of the series' row that is nearest in time."""
     if isinstance(raw.index, pd.RangeIndex):
         return np.clip(places + base // 10**9 - raw.index.start, 0, len(raw) - 1)
     stamps = pd.DatetimeIndex(raw.index)

@@ -72,6 +72,13 @@ def test_labels_follow_the_repairs_of_the_rows(written):
     assert len(found.notes) >= 2 and all("run.csv" in note for note in found.notes)
 
 
+def test_labels_are_those_of_the_series_that_is_read(written):
+    """Two hosts at the same times, one after the other: that of b has drifted where that of a is nominal."""
+    frame = pd.concat([table(6).assign(host="a", scenario="nominal"), table(6).assign(host="b", scenario=[*"nnnddd"])])
+    (part,) = read_recording(written(frame[["time", "host", "volts", "scenario"]]), ["b"]).parts
+    assert list(part.carried["scenario"]) == [*"nnnddd"] and set(part.carried["host"]) == {"b"}
+
+
 def test_another_rate_is_brought_to_the_wanted_one(written):
     finer, coarser = (read_recording(written(table(), f"{step}.csv"), ["volts"], interval_s=step) for step in (30, 5))
     np.testing.assert_allclose(finer.parts[0].values[1:-1, 0], 0.5 * 3 * np.arange(1, 20))  # means of three rows around each grid point
