@@ -135,7 +135,7 @@ def _interpolated(series: pd.Series, grid: np.ndarray, cleaning: Cleaning) -> pd
     times = series.index.as_unit("ns").asi8
     there = np.isfinite(values) & series.index.notna()
     groups = pd.Series(values[there]).groupby(times[there])
-    known = groups.mean() if cleaning.same_time == "mean" else groups.first() if cleaning.same_time == "first" else groups.last()
+    known = groups.mean() if cleaning.same_time == "mean" else groups.last()
     if not len(known):
         return series
     inside = grid[(grid >= known.index[0]) & (grid <= known.index[-1])]

@@ -4,7 +4,6 @@ Values are returned as they are in the source, and times are parsed but neither 
 Findings made while reading are stored in `series.attrs["findings"]` and become part of the cleaning report.
 """
 
-import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,11 +15,9 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.arrays import read_array_channels
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.influx_store import InfluxStore
-from enhsim_tf.telemetry.pandas_series import from_series, to_series
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.reading.channels import Channels, read_table_channels
-from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.registry import SOURCES, TABLES
-from enhsim_tf.telemetry.series import Telemetry, check_values
 
 Source = str | os.PathLike | Sequence[str | os.PathLike] | pd.DataFrame | pd.Series
 
@@ -93,31 +90,3 @@ def _read_influx(source: str, columns: list[str] | None, time: str | None) -> Ch
     field = store.location.field
     index = pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time")
     return Channels({field: pd.Series(values, index=index, name=field)})
-
-
-def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str | None = None, min_samples: int = 2) -> Telemetry:
-    """Reads one regularly sampled channel from a file, without any repair.
-
-    Args:
-        path: A table or an array, see `read_source`.
-        column: Column that holds the values: a name for tables, a number for arrays. Required if there are several.
-        time: Name of a table's time column, with regular date-times or seconds. None: the samples are counted.
-        min_samples: Smallest number of samples allowed.
-
-    Returns:
-        The telemetry, named after the file.
-
-    Raises:
-        InputError: If the file cannot be read, the column does not exist, or the values or times cannot be used as they are.
-    """
-    path = Path(path)
-    if not _exists(path) or path.is_dir():
-        raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is not a file. Check the path.")
-    channels = read_source(path, None if column is None else [column], NO_TIME if time is None else time, Cleaning(time_format="s"))
-    if len(channels) > 1:
-        known = ", ".join(list(channels)[:8])
-        raise InputError(f"Expected one column. Received: {len(channels)} in {path.name} ({known}). Name one with --column.")
-    (series,) = channels.values()
-    telemetry = from_series(series.rename(f"{series.name} of {path.name}"))
-    check_values(telemetry.values, telemetry.name, min_samples)
-    return dataclasses.replace(telemetry, name=path.stem)

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
-from enhsim_tf.telemetry.pandas_series import from_series, to_series
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 
@@ -127,22 +127,23 @@ def test_influxdb_refuses_a_time_column_and_an_incomplete_location(monkeypatch, 
         read_source("influxdb://bucket/bus/volts")
 
 
+@pytest.mark.parametrize("interval_s", [1 / 3, 1 / 30, 0.7])
+def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
+    times = (np.arange(400) * interval_s).round(3 if interval_s > 0.1 else 4)
+    pd.DataFrame({"v": np.arange(400) % 7, "t": times}).to_csv(tmp_path / "a.csv", index=False)
+    (part,) = clean(read_source(tmp_path / "a.csv", ["v"], "t", Cleaning(time_format="s"))["v"]).parts
+    assert np.abs(part.time_s - times).max() < 0.05 * interval_s and part.values.tolist() == (np.arange(400) % 7).tolist()
+    assert (part.start[:19], part.time_unit) == ("1970-01-01T00:00:00", "s")
+
+
 def test_telemetry_to_pandas_and_back(refused):
     timed = Telemetry(VALUES.astype(np.float32), 0.25, 2.5, "2020-03-01T06:00:00+00:00", "volts", "V")
     series = to_series(timed)
     assert (series.index == TIMES + pd.Timedelta("2.5s")).all() and (series.name, series.attrs["unit"]) == ("volts", "V")
-    back = from_series(series)
+    (back,) = clean(series).parts
     assert (back.values == timed.values).all() and (back.interval_s, back.name, back.unit) == (0.25, "volts", "V")
     assert pd.Timestamp(back.start) + pd.Timedelta(seconds=back.offset_s) == series.index[0]
     counted = to_series(Telemetry(VALUES.astype(np.float32), offset_s=7.0))
-    assert (counted.index[0], from_series(counted, unit="A").offset_s, from_series(counted, unit="A").unit) == (7, 7.0, "A")
-    some = series.index[10:30]
-    for dirty, words in (
-        (series.drop(some), "gap"),
-        (pd.concat([series, series.iloc[:1]]), "sorted"),
-        (series.mask(series > 0.9), "value"),
-    ):
-        with refused(words, "clean"):
-            from_series(dirty)
+    assert (counted.index[0], clean(counted).longest.offset_s) == (7, 7.0)
     with refused("ndarray"):
         to_series(VALUES)
