@@ -120,7 +120,8 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
     if commands is not None and options.coarse is None:
         if series.commands is None:
             raise InputError(
-                f"Expected an array with commands, as in the fit. Received: {options.source}, which has none. Give such an array."
+                f"Expected an array with commands, as in the fit. Received: none beside {next(iter(series))} in {options.source}. "
+                "Give such an array, and no other column than 0."
             )
         return CommandTraces.from_config(commands).recording(series.commands)
     if options.coarse is None:
