@@ -68,6 +68,17 @@ def test_channels_without_time(tmp_path):
     assert clean(channels["b"]).report.find("missing values").count == 2
 
 
+def test_commands_are_beside_the_channel_that_they_may_explain(tmp_path):
+    sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(float)  # one command after the other
+    np.save(tmp_path / "a.npy", np.column_stack([VALUES, sent]))
+    for columns in (None, ["0"]):
+        found = read_source(tmp_path / "a.npy", columns)
+        assert list(found) == ["a.0"] and found.commands.tolist() == sent.tolist()
+    assert read_source(tmp_path / "a.npy", ["3"]).commands is None, "it would be explained by itself"
+    np.save(tmp_path / "b.npy", np.column_stack([VALUES, 2 * sent]))
+    assert len(found := read_source(tmp_path / "b.npy")) == 25 and found.commands is None
+
+
 def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
     """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a killed recorder."""
     rows = ["{}:00,1", ",2", "{}:01,3", "boot,4", "{}:01,3", "{}:02,5", "{}:03"]
