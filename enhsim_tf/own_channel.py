@@ -1,5 +1,6 @@
 """The paper's pipeline on a channel of one's own: `python -m enhsim_tf.reproduce --telemetry`."""
 
+import os
 import zlib
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,10 @@ from enhsim_tf.common.stages import Stages
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.settings import Settings
 from enhsim_tf.paper.telemetry import START, Store, Telemetry
-from enhsim_tf.telemetry.sources import read_telemetry
+from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
+from enhsim_tf.telemetry.reading.clock import NO_TIME
+from enhsim_tf.telemetry.series import check_values
+from enhsim_tf.telemetry.sources import read_source
 
 _FEW, _NUM_OVERLAPPING = 20, 200  # with fewer disjoint windows in a part, so many overlapping ones are compared
 
@@ -26,23 +30,26 @@ class OwnChannel(Pipeline):
         settings: All settings.
         stages: Keeps the results.
         store: Where the telemetry is placed and read back from; None for a Parquet file in the cache.
-        path: A table or an array.
+        path: A table or an array. It is cleaned, and what was repaired is told.
         column: Its column with the values; None if there is one.
         time: Its column with the times; None: the samples are counted.
 
     Raises:
-        InputError: If the file cannot be read, no square wave fits, or a part is too short or without noise.
+        InputError: If the file cannot be read or has a long gap, no square wave fits, or a part is too short or without noise.
     """
 
     is_example = False
 
     def __init__(self, settings: Settings, stages: Stages, store: Store | None, path: Path, column: str | None, time: str | None):
         super().__init__(settings, stages, store)
-        read = read_telemetry(path, column, time)
+        cleaned = _clean(path, column, time)
+        for line in cleaned.report.lines():
+            stages.tell(line)
+        (read,) = cleaned.parts
         wave = SquareWaveSimulator.fit(read.part(0, len(read) // 2))
         offset, scale = level_offset_and_scale(wave)
         values, start = ((read.values - offset) / scale).astype(np.float32), (read.start or START).replace("+00:00", "Z")
-        self.own = Telemetry(values, read.interval_s, start, printable(read.name))
+        self.own = Telemetry(values, read.interval_s, start, printable(path.stem))
         self.simulator = lambda time: (wave(time + read.offset_s) - offset) / scale
         self.truth = lambda time: values[np.rint(time / read.interval_s).astype(int)]
         self.noise_unit = self._noise_unit()
@@ -70,3 +77,22 @@ class OwnChannel(Pipeline):
                     f"Expected noise around the moving average of {self.own.name}. Received: none in its {name} part. Choose another channel."
                 )
         return np.float32(10 * np.std(self.noise_windows("train"), dtype=np.float64))
+
+
+def _clean(path: Path, column: str | None, time: str | None) -> Cleaned:
+    """Reads and cleans the channel; raises an `InputError` if there are several, or if it has several parts or is constant."""
+    if not os.path.isfile(path):
+        raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is not a file. Check the path.")
+    cleaning = Cleaning(time_format="s")
+    channels = read_source(path, None if column is None else [column], NO_TIME if time is None else time, cleaning)
+    if len(channels) > 1:
+        known = ", ".join(list(channels)[:8])
+        raise InputError(f"Expected one column. Received: {len(channels)} in {path.name} ({known}). Name one with --column.")
+    (series,) = channels.values()
+    cleaned = clean(series.rename(f"{series.name} of {path.name}"), cleaning)
+    if len(cleaned.parts) > 1:
+        raise InputError(
+            f"Expected telemetry without long gaps. Received: {len(cleaned.parts)} parts in {path.name}. Cut it to one of them."
+        )
+    check_values(cleaned.longest.values, cleaned.report.channel)
+    return cleaned

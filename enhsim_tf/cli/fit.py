@@ -8,7 +8,6 @@ from enhsim_tf.cli.options import tell_failed
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.console import tell
 from enhsim_tf.simulator.fit_many import fit_channels
-from enhsim_tf.telemetry.arrays import read_commands
 from enhsim_tf.telemetry.sources import read_source
 
 
@@ -22,7 +21,7 @@ def run_fit(options: argparse.Namespace) -> int:
         given = options.coarse, options.coarse_column, options.coarse_time, cleaning.of_run(min_part=2)
         read_run = functools.partial(read_recording, *given, start=options.coarse_start)
     series = read_source(options.source, options.column, options.time, cleaning)
-    commands = None if read_run is not None else read_commands(options.source, options.column)
+    commands = None if read_run is not None else series.commands
     where = options.separately, options.workers, options.engine
     reports, failed = fit_channels(series, options.out, options.chosen, cleaning, say, *where, speaks, read_run, commands)
     if options.json:

@@ -17,8 +17,8 @@ from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import channels_of, folder_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.arrays import read_commands
 from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
+from enhsim_tf.telemetry.reading.channels import Channels
 
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
@@ -110,20 +110,20 @@ def cleaned_channels(series: Mapping[str, pd.Series], names: Mapping[str, str], 
     return joined[0], cleaned
 
 
-def run_for(simulator: EnhancedSimulator, options: argparse.Namespace, cleaning: Cleaning) -> Recording | None:
-    """Reads the coarse run that a simulator needs: the commands of the telemetry's own file, or the run of `--coarse`; None for waves."""
+def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Namespace, cleaning: Cleaning) -> Recording | None:
+    """Returns the coarse run that a simulator needs: the commands beside the telemetry, or the run of `--coarse`; None for waves."""
     if not simulator.is_run_model:
         if options.coarse is not None:
             simulator.recorded_runs()
         return None
     commands = simulator.alignment.commands
     if commands is not None and options.coarse is None:
-        found = read_commands(options.source)
-        if found is None:
+        if series.commands is None:
             raise InputError(
-                f"Expected an array with commands, as in the fit. Received: {options.source}, which has none. Give such an array."
+                f"Expected an array with commands, as in the fit. Received: none beside {next(iter(series))} in {options.source}. "
+                "Give such an array, and no other column than 0."
             )
-        return CommandTraces.from_config(commands).recording(found)
+        return CommandTraces.from_config(commands).recording(series.commands)
     if options.coarse is None:
         raise InputError(
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."

@@ -37,7 +37,7 @@ def run_score(options: argparse.Namespace) -> int:
     def write(model: str) -> None:
         telemetry, cleaned = cleaned_channels(series, channels[model], cleaning)
         simulator = EnhancedSimulator.load(models[model])
-        run = run_for(simulator, options, cleaning)
+        run = run_for(simulator, series, options, cleaning)
         frame = score(simulator, telemetry, run, options.chosen)
         write_scores(paths[model], frame)
         if options.figure:

@@ -36,7 +36,7 @@ def run_update(options: argparse.Namespace) -> int:
     def write(model: str) -> None:
         telemetry, cleaned = cleaned_channels(series, channels[model], cleaning)
         simulator = EnhancedSimulator.load(models[model])
-        run = run_for(simulator, options, cleaning)
+        run = run_for(simulator, series, options, cleaning)
         updated, report = update(simulator, telemetry, run, options.held_out, options.seed)
         kept = {"update": report.to_dict(), "cleaning": {name: each.report.to_dict() for name, each in cleaned.items()}}
         with replace_folder(folders[model]) as temporary:

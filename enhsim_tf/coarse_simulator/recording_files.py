@@ -19,13 +19,10 @@ from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.regular_grid import find_interval, regular_step_fraction
 from enhsim_tf.telemetry.cleaning.report import ROWS, iso_time
 from enhsim_tf.telemetry.cleaning.times import localize_times
-from enhsim_tf.telemetry.reading.files import read_table
-from enhsim_tf.telemetry.registry import FILES
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 from enhsim_tf.telemetry.sources import Source, read_source
 from enhsim_tf.telemetry.windows import runs_of
 
-_TABLES = tuple(ending for ending, reader in FILES.items() if reader.endswith(":read_table_channels"))
 _QUIET = ("constant", "stuck", "quantised", "changing level")
 _NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns")  # findings of columns that are no inputs
 _FEW_ODD = 0.002  # share of steps that are no whole number of intervals, above which a run is interpolated
@@ -62,7 +59,6 @@ def read_recording(
         name = printable(Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name)
     if cleaning.same_time is None:
         cleaning = dataclasses.replace(cleaning, same_time="last")
-    table = _table_of(source, cleaning)
     given = read_source(source, columns, time, cleaning)
     raw, stepped = _at_equal_steps(given, interval_s, cleaning)
     names, cleaned = list(raw), {each: clean(raw[each], cleaning) for each in raw}
@@ -92,6 +88,7 @@ def read_recording(
     if len(shared) > 1:
         notes.append(f"{name}: gaps, at which the run is split into {len(shared)} parts")
     used, offset_s = (*names, given[names[0]].index.name), 0.0 if has_time else base / 1e9
+    table = given.rows_of(names[0])
     others = [each for each in (() if table is None else table) if each not in used and not each.startswith(("column ", "Unnamed: "))]
     parts = []
     for begin, end in shared:
@@ -138,7 +135,7 @@ def _interpolated(series: pd.Series, grid: np.ndarray, cleaning: Cleaning) -> pd
     times = series.index.as_unit("ns").asi8
     there = np.isfinite(values) & series.index.notna()
     groups = pd.Series(values[there]).groupby(times[there])
-    known = groups.mean() if cleaning.same_time == "mean" else groups.first() if cleaning.same_time == "first" else groups.last()
+    known = groups.mean() if cleaning.same_time == "mean" else groups.last()
     if not len(known):
         return series
     inside = grid[(grid >= known.index[0]) & (grid <= known.index[-1])]
@@ -146,17 +143,6 @@ def _interpolated(series: pd.Series, grid: np.ndarray, cleaning: Cleaning) -> pd
     found = pd.Series(np.interp(inside, known.index.to_numpy(np.float64), known.to_numpy()), index=index, name=series.name)
     found.attrs = {key: value for key, value in series.attrs.items() if key != "places"}
     return found
-
-
-def _table_of(source: Source, cleaning: Cleaning) -> pd.DataFrame | None:
-    """Returns the table behind a source, or None if it is none."""
-    if isinstance(source, str | os.PathLike):
-        source = Path(os.fspath(source))
-        if source.suffix.lower() not in _TABLES or not source.is_file():
-            return None
-    elif not isinstance(source, pd.DataFrame | pd.Series):
-        source = list(map(Path, source))
-    return read_table(source, cleaning).frame
 
 
 def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float) -> tuple[int, np.ndarray]:
@@ -176,7 +162,7 @@ def _begin_ns(part: Telemetry) -> int:
 
 
 def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning) -> np.ndarray:
-    """Returns, for each grid point, the number of the source's row that is nearest in time."""
+    """Returns, for each grid point, the number of the series' row that is nearest in time."""
     if isinstance(raw.index, pd.RangeIndex):
         return np.clip(places + base // 10**9 - raw.index.start, 0, len(raw) - 1)
     stamps = pd.DatetimeIndex(raw.index)

@@ -4,8 +4,6 @@ In telemanom's SMAP and MSL data, column 0 of an array is the value, and each of
 one command was sent and 0 at all others.
 """
 
-import os
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +11,18 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import MAX_COLUMNS, load_npy
-from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding
+from enhsim_tf.telemetry.reading.channels import Channels
 from enhsim_tf.telemetry.reading.clock import NO_TIME
 
 _NUM_COLUMNS = (25, 55)  # of the published arrays with commands: SMAP, MSL
 
 
-def read_array_channels(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
-    """Reads the columns of an array; see `sources.read_source`, which calls it. `options` has no effect, since there are no times.
+def read_array_channels(path: Path, columns: list[str] | None, time: str | None) -> Channels:
+    """Reads the columns of an array; see `sources.read_source`, which calls it.
 
-    Of an array with commands, only column 0 is read, unless columns are named.
+    Of an array with commands, only column 0 is read, unless columns are named. The commands are returned beside it, but not if one of them
+    is named as a channel: it would be explained by itself.
     """
     if time not in (None, NO_TIME):
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
@@ -41,36 +40,19 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None,
     if columns is None and array.shape[1] > MAX_COLUMNS:
         raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
     known, last, found = {str(number): number for number in range(array.shape[1])}, array.shape[1] - 1, {}
-    has_commands = columns is None and _has_commands(array)
+    has_commands = columns in (None, ["0"]) and _has_commands(array)
     for column in ["0"] if has_commands else columns or known:
         if column not in known:
             raise InputError(f"Expected a column of {path.name}, a number from 0 to {last}. Received: {column!r}. Name one of these.")
         name = path.stem if last == 0 else f"{path.stem}.{column}"
         found[name] = pd.Series(array[:, known[column]], name=name)
-        if has_commands:
+        if has_commands and columns is None:
             text = f"columns 1 to {last} hold only 0 and 1 and were taken as commands, not as channels: {last}"
             found[name].attrs["findings"] = [Finding("commands", last, text).to_dict()]
-    return found
-
-
-def read_commands(source: str | os.PathLike, columns: Sequence[str] | None = None) -> np.ndarray | None:
-    """Reads the commands of a source of telemetry of which `columns` (None: all) are read as channels.
-
-    Returns:
-        float32 array of shape `(samples, commands)`, or None if the source is not an array of this layout, or if a column of commands is
-        read as a channel: it would be explained by itself.
-    """
-    path = Path(source)
-    if any(str(each) != "0" for each in columns or ()) or path.suffix.lower() != ".npy" or not path.is_file():
-        return None
-    try:
-        array = load_npy(path)
-    except ValueError:  # the reader of the channels says what is wrong with the file
-        return None
-    return array[:, 1:].astype(np.float32) if _has_commands(array) else None
+    return Channels(found, commands=array[:, 1:].astype(np.float32) if has_commands else None)
 
 
 def _has_commands(array: np.ndarray) -> bool:
     """Whether an array has the published layout: 25 or 55 columns, of which all after the first hold only zeros and ones."""
-    has_layout = array.ndim == 2 and array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array)
+    has_layout = array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array)
     return bool(has_layout) and bool(np.isin(array[:, 1:], (0, 1)).all())

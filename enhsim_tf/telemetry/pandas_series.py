@@ -1,17 +1,10 @@
-"""Conversion between telemetry and pandas Series."""
+"""Telemetry as pandas Series."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import pandas as pd
 
-from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
-
-_NO_REPAIRS = Cleaning(max_fill=0, min_part=1, same_time="refuse")
-_BREAKS = ("gaps", "clock steps")  # accepted by the cleaning, which splits the series there
-_MAX_ROUNDING = 0.05  # largest distance of a time from the regular grid, in intervals: rounded times, or a rounded interval
 
 
 def to_series(telemetry: Telemetry) -> pd.Series:
@@ -35,27 +28,3 @@ def to_series(telemetry: Telemetry) -> pd.Series:
 def index_of(parts: Sequence[Telemetry]) -> pd.Index:
     """Returns the index that the parts of a series have together, see `to_series`."""
     return pd.concat([to_series(part) for part in parts]).index
-
-
-def from_series(series: pd.Series, unit: str | None = None) -> Telemetry:
-    """Converts a regular pandas Series to telemetry.
-
-    Args:
-        series: Numbers with a regular `DatetimeIndex` or a `RangeIndex`. Times may be off the regular grid by a twentieth of
-            the interval, as rounded times are.
-        unit: Unit of the values. None: `series.attrs["unit"]`, or "1".
-
-    Returns:
-        The telemetry.
-
-    Raises:
-        InputError: If the series would need repairs. Use `clean` for such a series.
-    """
-    cleaned = clean(series, _NO_REPAIRS)
-    for finding in cleaned.report.findings:
-        is_rounding = finding.kind == "jitter" and finding.details["largest_s"] <= _MAX_ROUNDING * cleaned.report.interval_s
-        if finding.kind in _BREAKS or not (finding.action == "accepted" or is_rounding):
-            what = finding.line().removeprefix(f"{finding.action}: ")
-            raise InputError(f"Expected a regular series. Received: {cleaned.report.channel} with {what}. Clean it first: clean(series).")
-    (telemetry,) = cleaned.parts
-    return telemetry if unit is None else dataclasses.replace(telemetry, unit=unit)

@@ -95,19 +95,18 @@ def check_telemetry(telemetry: Telemetry) -> None:
         )
 
 
-def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndarray:
+def check_values(values: np.ndarray, what: str) -> np.ndarray:
     """Checks the values of a series and converts them to float32.
 
     Args:
         values: Array of shape `(samples,)`.
         what: Description of the source, for messages.
-        min_samples: Smallest number of samples allowed.
 
     Returns:
         float32 array of shape `(samples,)`.
 
     Raises:
-        InputError: If the values are not numeric (booleans do not count as numbers), not one-dimensional, empty, too few,
+        InputError: If the values are not numeric (booleans do not count as numbers), not one-dimensional, fewer than two,
             constant, not finite, or beyond the range of float32.
     """
     given = values = np.asarray(values)
@@ -125,10 +124,8 @@ def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndar
             f"Expected finite values, up to {np.finfo(np.float32).max:.1e} as float32 holds. Received: {len(bad)} others in {what}, "
             f"the first ({given[bad[0]]:g}) at sample {bad[0]}. Fill or cut them, or give another unit."
         )
-    if len(values) < min_samples:
-        raise InputError(
-            f"Expected at least {min_samples} samples. Received: {len(values)} from {what}. Give a longer series or a smaller window."
-        )
+    if len(values) < 2:
+        raise InputError(f"Expected at least 2 samples. Received: {len(values)} from {what}. Give a longer series.")
     if np.ptp(values) == 0:
         raise InputError(f"Expected values that vary. Received: the constant {values[0]:g} in {what}. Choose another channel.")
     return values

@@ -4,8 +4,6 @@ Values are returned as they are in the source, and times are parsed but neither 
 Findings made while reading are stored in `series.attrs["findings"]` and become part of the cleaning report.
 """
 
-import dataclasses
-import importlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,20 +12,17 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.arrays import read_array_channels
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.influx_store import InfluxStore
-from enhsim_tf.telemetry.pandas_series import from_series, to_series
-from enhsim_tf.telemetry.reading.channels import read_table_channels
-from enhsim_tf.telemetry.reading.clock import NO_TIME
-from enhsim_tf.telemetry.registry import FILES, SOURCES
-from enhsim_tf.telemetry.series import Telemetry, check_values
+from enhsim_tf.telemetry.pandas_series import to_series
+from enhsim_tf.telemetry.reading.channels import Channels, read_table_channels
+from enhsim_tf.telemetry.registry import SOURCES, TABLES
 
 Source = str | os.PathLike | Sequence[str | os.PathLike] | pd.DataFrame | pd.Series
 
 
-def read_source(
-    source: Source, columns: Sequence[str] | None = None, time: str | None = None, options: Cleaning | None = None
-) -> dict[str, pd.Series]:
+def read_source(source: Source, columns: Sequence[str] | None = None, time: str | None = None, options: Cleaning | None = None) -> Channels:
     """Reads raw channels from a source.
 
     Args:
@@ -41,7 +36,8 @@ def read_source(
 
     Returns:
         Raw channels by name, in the order of the source. A channel with times has a `DatetimeIndex`, with NaT where a time is
-        missing; a channel without times has a `RangeIndex`. `series.attrs["unit"]` holds the unit, if it is known.
+        missing; a channel without times has a `RangeIndex`. `series.attrs["unit"]` holds the unit, if it is known. The dictionary also
+        has the whole `table` and the `commands` of an array, see `Channels`.
 
     Raises:
         InputError: If the source cannot be read, or a column does not exist.
@@ -56,7 +52,7 @@ def read_source(
         return read_table_channels(source, columns, time, options)
     if not isinstance(source, str | os.PathLike):
         paths = [Path(os.fspath(each)) for each in source]
-        wrong = next((path for path in paths if FILES.get(path.suffix.lower()) != FILES[".csv"] or not _exists(path)), None)
+        wrong = next((path for path in paths if path.suffix.lower() not in TABLES or not _exists(path)), None)
         if wrong is not None or not paths:
             raise InputError(f"Expected tables that exist, as several sources are files of one table. Received: {wrong}. Give one source.")
         return read_table_channels(paths if len(paths) > 1 else paths[0], columns, time, options)
@@ -66,12 +62,11 @@ def read_source(
     path = Path(source)
     if not _exists(path):
         raise InputError(f"Expected a source of telemetry. Received: {source}, which does not exist. Give {SOURCES}.")
-    if path.is_dir():
+    if path.is_dir() or path.suffix.lower() in TABLES:
         return read_table_channels(path, columns, time, options)
-    if path.suffix.lower() not in FILES:
-        raise InputError(f"Expected a source of telemetry. Received: {path.name}. Give {SOURCES}.")
-    module, reader = FILES[path.suffix.lower()].split(":")
-    return getattr(importlib.import_module(module), reader)(path, columns, time, options)
+    if path.suffix.lower() == ".npy":
+        return read_array_channels(path, columns, time)
+    raise InputError(f"Expected a source of telemetry. Received: {path.name}. Give {SOURCES}.")
 
 
 def _exists(path: Path) -> bool:
@@ -81,44 +76,17 @@ def _exists(path: Path) -> bool:
         return False
 
 
-def _read_influx(source: str, columns: list[str] | None, time: str | None) -> dict[str, pd.Series]:
+def _read_influx(source: str, columns: list[str] | None, time: str | None) -> Channels:
     """Reads the series written by an `InfluxStore`, or otherwise the one series at the address, named after its field."""
     if time is not None:
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {source}. Leave it out.")
     store = InfluxStore(source)
     names = store.names()
     if names:
-        return {name: to_series(store.read(name)) for name in (names if columns is None else columns)}
+        return Channels({name: to_series(store.read(name)) for name in (names if columns is None else columns)})
     if columns is not None:
         raise InputError(f"Expected the field in the address alone. Received: columns={columns} with {source}. Leave them out.")
     times, values = (np.concatenate(blocks) for blocks in zip(*store.chunks(), strict=True))
     field = store.location.field
-    return {field: pd.Series(values, index=pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time"), name=field)}
-
-
-def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str | None = None, min_samples: int = 2) -> Telemetry:
-    """Reads one regularly sampled channel from a file, without any repair.
-
-    Args:
-        path: A table or an array, see `read_source`.
-        column: Column that holds the values: a name for tables, a number for arrays. Required if there are several.
-        time: Name of a table's time column, with regular date-times or seconds. None: the samples are counted.
-        min_samples: Smallest number of samples allowed.
-
-    Returns:
-        The telemetry, named after the file.
-
-    Raises:
-        InputError: If the file cannot be read, the column does not exist, or the values or times cannot be used as they are.
-    """
-    path = Path(path)
-    if not _exists(path) or path.is_dir():
-        raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is not a file. Check the path.")
-    channels = read_source(path, None if column is None else [column], NO_TIME if time is None else time, Cleaning(time_format="s"))
-    if len(channels) > 1:
-        known = ", ".join(list(channels)[:8])
-        raise InputError(f"Expected one column. Received: {len(channels)} in {path.name} ({known}). Name one with --column.")
-    (series,) = channels.values()
-    telemetry = from_series(series.rename(f"{series.name} of {path.name}"))
-    check_values(telemetry.values, telemetry.name, min_samples)
-    return dataclasses.replace(telemetry, name=path.stem)
+    index = pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time")
+    return Channels({field: pd.Series(values, index=index, name=field)})

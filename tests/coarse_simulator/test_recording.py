@@ -72,6 +72,21 @@ def test_labels_follow_the_repairs_of_the_rows(written):
     assert len(found.notes) >= 2 and all("run.csv" in note for note in found.notes)
 
 
+def test_labels_are_those_of_the_series_that_is_read(written):
+    """Two hosts at the same times, one after the other: that of b has drifted where that of a is nominal."""
+    frame = pd.concat([table(6).assign(host="a", scenario="nominal"), table(6).assign(host="b", scenario=[*"nnnddd"])])
+    (part,) = read_recording(written(frame[["time", "host", "volts", "scenario"]]), ["b"]).parts
+    assert list(part.carried["scenario"]) == [*"nnnddd"] and set(part.carried["host"]) == {"b"}
+
+
+def test_a_run_in_several_files_keeps_its_labels(written, tmp_path):
+    written(table().iloc[:30], "1.csv")
+    written(table().iloc[30:], "2.csv")
+    for source in (tmp_path, [tmp_path / "1.csv", tmp_path / "2.csv"]):
+        (part,) = read_recording(source, ["volts"]).parts
+        assert list(part.carried["scenario"]) == ["nominal"] * 20 + ["leak"] * 40
+
+
 def test_another_rate_is_brought_to_the_wanted_one(written):
     finer, coarser = (read_recording(written(table(), f"{step}.csv"), ["volts"], interval_s=step) for step in (30, 5))
     np.testing.assert_allclose(finer.parts[0].values[1:-1, 0], 0.5 * 3 * np.arange(1, 20))  # means of three rows around each grid point

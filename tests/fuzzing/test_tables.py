@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
-from enhsim_tf.telemetry.sources import read_source, read_telemetry
+from enhsim_tf.telemetry.sources import read_source
 from tests.fuzzing.readers import all_of, changed, judge, tried
 
 NUM = 60
@@ -33,7 +33,7 @@ def use(source):
 
 def read_file(name, data, folder):
     (folder / name).write_bytes(data)
-    all_of(lambda: use(folder / name), lambda: read_telemetry(folder / name), lambda: read_telemetry(folder / name, "value", "time"))
+    all_of(lambda: use(folder / name), lambda: read_source(folder / name, ["value"], "time"))
 
 
 def csv_seeds():

@@ -16,7 +16,7 @@ from enhsim_tf.datasets.places import parse_num_samples, parse_scenario, parse_s
 from enhsim_tf.simulator.model_folder import folder_of
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.influx_store import parse_location
-from enhsim_tf.telemetry.sources import read_source, read_telemetry
+from enhsim_tf.telemetry.sources import read_source
 from tests.fuzzing.readers import all_of, changed, judge, tried
 
 SCENARIOS = b"""\
@@ -77,14 +77,14 @@ def column(text, folder):
         lambda: read_source(path, [text]),
         lambda: read_source(path, None, text),
         lambda: read_source(folder / "x.npy", [text]),
-        lambda: read_telemetry(path, "value", text),
+        lambda: read_source(path, ["value"], text),
     )
 
 
 def source(text, folder):
     (folder / "x.csv").write_text("value\n1\n2\n3\n")
     text = text.replace("/", ":")  # so that it does not leave this folder
-    all_of(lambda: read_source(text), lambda: read_telemetry(text), lambda: read_mix(text))
+    all_of(lambda: read_source(text), lambda: read_mix(text))
 
 
 def command_line(text, folder):

@@ -13,6 +13,7 @@ import enhsim_tf
 from book import __main__ as command
 from book import tables
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.reading.channels import Channels
 
 ROOT = Path(__file__).parents[2]
 
@@ -74,15 +75,15 @@ def test_a_table_stands_between_its_markers():
 
 
 def test_the_examples_for_contributors_work(tmp_path):
-    names = {"np": np, "pd": pd, "Path": Path, "Any": Any, "Cleaning": None, "InputError": InputError}
+    names = {"np": np, "pd": pd, "Path": Path, "Any": Any, "Channels": Channels, "InputError": InputError}
     for block in re.findall(r"```python\n(\S.*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.S):
         exec(block, names)
     windows = np.array([[0.0, 1.0], [2.0, 3.0], [0.0, 4.0]])
     assert names["WindowRange"]().fit(windows).score(windows).tolist() == [0, 0, 3]
     assert names["Ramp"](4.0).run(np.arange(6)).ravel().tolist() == [0, 0.25, 0.5, 0.75, 0, 0.25]
     (tmp_path / "x.jsonl").write_text('{"volts": 1.5, "mode": "on"}\n{"volts": 2.5, "mode": "off"}\n')
-    (channel,) = names["read_json_lines"](tmp_path / "x.jsonl", None, None, None).values()
+    (channel,) = names["read_json_lines"](tmp_path / "x.jsonl", None).values()
     assert channel.tolist() == [1.5, 2.5]
     (tmp_path / "bad.jsonl").write_text("{")
     with pytest.raises(InputError):
-        names["read_json_lines"](tmp_path / "bad.jsonl", None, None, None)
+        names["read_json_lines"](tmp_path / "bad.jsonl", None)

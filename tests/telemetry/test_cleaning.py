@@ -227,15 +227,13 @@ def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused)
         clean(VALUES, Cleaning(interval_s=2))
 
 
-@pytest.mark.parametrize(("how", "value"), [("mean", 5.0), ("first", 4.0), ("last", 6.0)])
-def test_one_of_several_values_at_the_same_time_is_taken(refused, how, value):
+@pytest.mark.parametrize(("how", "value"), [("mean", 5.0), ("last", 6.0)])
+def test_one_of_several_values_at_the_same_time_is_taken(how, value):
     series = pd.concat([CLEAN.iloc[:11], with_times(TIMES[[11, 11]], [4.0, 6.0]), CLEAN.iloc[12:]])
     cleaned = cleaned_of(series, same_time=how)
     as_one(cleaned, np.where(np.arange(N) == 11, value, VALUES))
     (finding,) = repairs(cleaned.report)
     assert (finding.kind, finding.count, finding.rows_left_out) == ("same time", 1, 1) and "2020-03-01T00:00:11" in finding.places[0]
-    with refused("2020-03-01T00:00:11"):
-        clean(series, Cleaning(same_time="refuse"))
 
 
 @pytest.mark.parametrize("interval_s", [None, 1.0])
@@ -263,7 +261,7 @@ MEAN = (9 + VALUES[50]) / 2
 
 @pytest.mark.parametrize(
     ("options", "value"),
-    [({}, MEAN), ({"same_time": "last"}, 9), ({"same_time": "first"}, VALUES[50]), ({"same_time": "last", "interval_s": 1.0}, MEAN)],
+    [({}, MEAN), ({"same_time": "last"}, 9), ({"same_time": "last", "interval_s": 1.0}, MEAN)],
 )
 def test_rows_near_the_same_sample_are_merged_as_asked(options, value):
     series = pd.concat([CLEAN, with_times([TIMES[50] + pd.Timedelta("200ms")], [9.0])]).sort_index()
@@ -281,7 +279,7 @@ def test_two_rows_are_enough_for_an_interval():
 
 def test_a_missing_value_at_a_repeated_time_is_ignored():
     series = pd.concat([CLEAN.iloc[:6], pd.Series([np.nan, 9.0], index=TIMES[[5, 6]]), CLEAN.iloc[7:]])
-    for how in ("mean", "first", "last"):
+    for how in ("mean", "last"):
         cleaned = cleaned_of(series, same_time=how)
         as_one(cleaned, np.where(np.arange(N) == 6, 9.0, VALUES))
         assert cleaned.report.find("same time").count == 1 and cleaned.report.find("missing values") is None
@@ -468,7 +466,7 @@ DIRTY_STEP = st.one_of(st.just(1.0), st.floats(0, 3), st.sampled_from([0.0, -1.0
     nominal=st.integers(0, 60),
     options=st.fixed_dictionaries(
         {
-            "same_time": st.sampled_from(["mean", "first", "last"]),
+            "same_time": st.sampled_from(["mean", "last"]),
             "on_bad_values": st.sampled_from(["drop", "drop", "refuse"]),
             "max_fill": st.integers(0, 8),
             "min_part": st.integers(1, 12),

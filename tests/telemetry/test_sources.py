@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
-from enhsim_tf.telemetry.pandas_series import from_series, to_series
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 
@@ -68,6 +68,17 @@ def test_channels_without_time(tmp_path):
     assert clean(channels["b"]).report.find("missing values").count == 2
 
 
+def test_commands_are_beside_the_channel_that_they_may_explain(tmp_path):
+    sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(float)  # one command after the other
+    np.save(tmp_path / "a.npy", np.column_stack([VALUES, sent]))
+    for columns in (None, ["0"]):
+        found = read_source(tmp_path / "a.npy", columns)
+        assert list(found) == ["a.0"] and found.commands.tolist() == sent.tolist()
+    assert read_source(tmp_path / "a.npy", ["3"]).commands is None, "it would be explained by itself"
+    np.save(tmp_path / "b.npy", np.column_stack([VALUES, 2 * sent]))
+    assert len(found := read_source(tmp_path / "b.npy")) == 25 and found.commands is None
+
+
 def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
     """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a killed recorder."""
     rows = ["{}:00,1", ",2", "{}:01,3", "boot,4", "{}:01,3", "{}:02,5", "{}:03"]
@@ -127,22 +138,23 @@ def test_influxdb_refuses_a_time_column_and_an_incomplete_location(monkeypatch, 
         read_source("influxdb://bucket/bus/volts")
 
 
+@pytest.mark.parametrize("interval_s", [1 / 3, 1 / 30, 0.7])
+def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
+    times = (np.arange(400) * interval_s).round(3 if interval_s > 0.1 else 4)
+    pd.DataFrame({"v": np.arange(400) % 7, "t": times}).to_csv(tmp_path / "a.csv", index=False)
+    (part,) = clean(read_source(tmp_path / "a.csv", ["v"], "t", Cleaning(time_format="s"))["v"]).parts
+    assert np.abs(part.time_s - times).max() < 0.05 * interval_s and part.values.tolist() == (np.arange(400) % 7).tolist()
+    assert (part.start[:19], part.time_unit) == ("1970-01-01T00:00:00", "s")
+
+
 def test_telemetry_to_pandas_and_back(refused):
     timed = Telemetry(VALUES.astype(np.float32), 0.25, 2.5, "2020-03-01T06:00:00+00:00", "volts", "V")
     series = to_series(timed)
     assert (series.index == TIMES + pd.Timedelta("2.5s")).all() and (series.name, series.attrs["unit"]) == ("volts", "V")
-    back = from_series(series)
+    (back,) = clean(series).parts
     assert (back.values == timed.values).all() and (back.interval_s, back.name, back.unit) == (0.25, "volts", "V")
     assert pd.Timestamp(back.start) + pd.Timedelta(seconds=back.offset_s) == series.index[0]
     counted = to_series(Telemetry(VALUES.astype(np.float32), offset_s=7.0))
-    assert (counted.index[0], from_series(counted, unit="A").offset_s, from_series(counted, unit="A").unit) == (7, 7.0, "A")
-    some = series.index[10:30]
-    for dirty, words in (
-        (series.drop(some), "gap"),
-        (pd.concat([series, series.iloc[:1]]), "sorted"),
-        (series.mask(series > 0.9), "value"),
-    ):
-        with refused(words, "clean"):
-            from_series(dirty)
+    assert (counted.index[0], clean(counted).longest.offset_s) == (7, 7.0)
     with refused("ndarray"):
         to_series(VALUES)

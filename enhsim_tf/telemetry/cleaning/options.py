@@ -8,7 +8,7 @@ from enhsim_tf.common.errors import InputError
 _CHOICES = {
     "on_bad_times": ("refuse", "drop"),
     "on_bad_values": ("refuse", "drop"),
-    "same_time": (None, "mean", "first", "last", "refuse"),
+    "same_time": (None, "mean", "last"),
     "fill": ("linear", "hold"),
     "labelled": ("keep", "missing"),
     "decimal": (None, ".", ","),
@@ -35,8 +35,7 @@ class Cleaning:
         on_bad_values: Treatment of values that cannot be read: "refuse" raises an `InputError`, "drop" treats them as missing.
         decimal: Decimal sign, "." or ",". The other sign then separates thousands. None: decided from all columns of a file.
         missing_values: Values that mean "no value", numbers or text, such as `(-999.9, "offline")`.
-        same_time: Treatment of different values at the same time: take their "mean", the "first" or the "last", or "refuse".
-            None: the mean, unless it would merge most rows.
+        same_time: Treatment of different values at the same time: take their "mean" or the "last". None: the mean, unless it would merge most rows.
         max_jitter: Largest distance of a time from the regular grid, in intervals, at most 0.5. The series is split where the
             distance is larger.
         max_fill: Longest gap that is filled, in samples. The series is split at longer gaps. None: 5, or 1,000,000 with

@@ -157,10 +157,6 @@ def _drop_duplicate_times(rows: Rows, bad: np.ndarray, log: CleaningLog, name: s
             f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
             "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval) or same_time='mean'."
         )
-    if same_time == "refuse" and len(left):
-        raise InputError(
-            f"Expected one value for each time. Received: {len(left):,} more in {name}, the first at {log.place(left[0])}. Give same_time='mean'."
-        )
     text = f"rows with another value at the same time, of which the {same_time or 'mean'} was taken: {{count}}"
     log.add("same time", left, text, rows_left_out=len(left))
     return kept
@@ -175,7 +171,7 @@ def _merge_groups(rows: Rows, groups: np.ndarray, how: str) -> tuple[Rows, np.nd
     ranked = np.lexsort((order, ~has_value, groups))  # within each group, rows with a value come first
     chosen = ranked[np.flatnonzero(np.diff(groups[ranked], prepend=groups[ranked[0]] - 1))]
     kept = rows.take(chosen)
-    if how not in ("first", "last"):
+    if how != "last":
         means = pd.Series(np.where(has_value, rows.values, np.nan)).groupby(groups).mean().to_numpy()
         kept.values = np.where(np.isfinite(means), means, kept.values)
     return kept, np.delete(rows.source_row, chosen)
@@ -258,11 +254,6 @@ def _build_parts(
             continue
         off[segment.rows] = segment.off
         inside, left = _merge_groups(inside, segment.places, same_place)
-        if same_place == "refuse" and len(left):
-            raise InputError(
-                f"Expected one row for each interval of {interval / 1e9:.6g} s. Received: another at {log.place(left[0])} of {name}. "
-                "Give same_time='mean'."
-            )
         merged.append(left)
         places, samples = np.unique(segment.places), np.arange(length)
         previous = np.searchsorted(places, samples, "right") - 1

@@ -1,7 +1,7 @@
 """Reads the channels of a table, each with its times and with findings that say what was decided."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +33,28 @@ _MAX_SERIES = 500  # values of a column that tells series apart unasked
 _OFTEN = 0.3  # share of the rows whose time repeats, above which a table may hold several series
 
 
+class Channels(dict[str, pd.Series]):
+    """Raw channels by name, with what their source holds beside them.
+
+    Args:
+        channels: The channels.
+        table: The whole table that the channels are columns of; None if they are from another source.
+        commands: Commands of the samples of an array, float32 of shape `(samples, commands)`, or None.
+    """
+
+    def __init__(self, channels: Mapping[str, pd.Series], table: pd.DataFrame | None = None, commands: np.ndarray | None = None):
+        super().__init__(channels)
+        self.table, self.commands = table, commands
+
+    def rows_of(self, name: str) -> pd.DataFrame | None:
+        """The rows of the table that hold a channel: all of them, unless the table holds several series. None if there is no table."""
+        rows = None if self.table is None else self[name].attrs["places"].rows
+        return self.table if rows is None else self.table.iloc[rows]
+
+
 def read_table_channels(
     source: Path | Sequence[Path] | pd.DataFrame | pd.Series, columns: list[str] | None, time: str | None, options: Cleaning
-) -> dict[str, pd.Series]:
+) -> Channels:
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
     what = "the table"
     if not isinstance(source, pd.DataFrame | pd.Series):
@@ -73,7 +92,8 @@ def read_table_channels(
         raise InputError(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}. Give another table, or name the columns."
         )
-    return {name: _channel(table, layout, name, *place, findings, options) for name, place in chosen.items()}
+    channels = {name: _channel(table, layout, name, *place, findings, options) for name, place in chosen.items()}
+    return Channels(channels, table.frame)
 
 
 def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
