@@ -9,7 +9,7 @@ detectors by name.
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.common.window_features import window_features
+from enhsim_tf.common.two_sample import window_features
 
 _WIDTH = 25  # samples of a moving deviation
 _BOUND = 1.5  # largest factor by which the scale of nominal residuals may grow

@@ -8,7 +8,7 @@ from sklearn.ensemble import IsolationForest
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.backend import keras
-from enhsim_tf.common.window_features import window_features
+from enhsim_tf.common.two_sample import window_features
 from enhsim_tf.paper.enhancer import Pairs
 from enhsim_tf.paper.settings import Settings
 

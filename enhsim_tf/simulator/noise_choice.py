@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.two_sample import boosted_trees
-from enhsim_tf.common.window_features import window_features
+from enhsim_tf.common.two_sample import boosted_trees, window_features
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject
 from enhsim_tf.detection.registry import DETECTORS

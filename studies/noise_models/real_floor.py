@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common import measures as fidelity
 from enhsim_tf.common import two_sample
-from enhsim_tf.common.window_features import window_features
+from enhsim_tf.common.two_sample import window_features
 from enhsim_tf.simulator.noise_choice import DECIMALS
 from studies.noise_models import distances
 

@@ -6,8 +6,7 @@ import scipy.signal
 import scipy.stats
 
 from enhsim_tf.common import measures
-from enhsim_tf.common.two_sample import two_sample_auc
-from enhsim_tf.common.window_features import window_features
+from enhsim_tf.common.two_sample import two_sample_auc, window_features
 
 
 def normal(*shape, seed=0):

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.common.two_sample import boosted_trees
-from enhsim_tf.common.window_features import window_features
+from enhsim_tf.common.two_sample import boosted_trees, window_features
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.noise_choice import (
     CandidateJudgement,
