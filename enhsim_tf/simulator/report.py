@@ -78,7 +78,7 @@ class Report:
         if recall < _LEAST_RECALL:
             found.append(
                 f"WARNING: {self.detector}, the detector that score uses, finds only {recall:.0%} of the injected anomalies, so a fault can go unseen. "
-                "Try another --window, and compare the line of the detectors"
+                "Compare the line of the detectors; another --window, or --detector of score, may find more"
             )
         used = next((each for each in self.noise_candidates if each["is_chosen"]), None)
         if used is not None and (used["auc"] or 0) > TOLD_APART:
