@@ -5,7 +5,7 @@ import argparse
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.engines import parse_workers
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
-from enhsim_tf.simulator.options import FitOptions, ScoreOptions, options_from
+from enhsim_tf.simulator.options import FitOptions, ScoreOptions, option_of, options_from
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 
 _OF_RUNS = "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values"
@@ -113,8 +113,7 @@ def _refuse(options: argparse.Namespace, when: str, *names: str) -> None:
     """Refuses options that are given."""
     for name in names:
         if getattr(options, name) not in (None, [], False):
-            word = name.removesuffix("_s").replace("_", "-")
-            raise InputError(f"Expected no --{word} {when}. Received: --{word}. Leave it out.")
+            raise InputError(f"Expected no {option_of(name)} {when}. Received: {option_of(name)}. Leave it out.")
 
 
 def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:

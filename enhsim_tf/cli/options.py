@@ -13,12 +13,13 @@ from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.atomic_files import make_folder
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import channels_of, folder_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 from enhsim_tf.telemetry.reading.channels import Channels
+from enhsim_tf.telemetry.sources import read_source
 
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
@@ -35,9 +36,10 @@ def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
 
 
 def tell_failed(failed: dict[str, str]) -> int:
-    """Prints one line on stderr for each failed channel, with the reason, and returns the exit code."""
-    for channel, reason in failed.items():
-        print(f"error: {printable(channel)}: {' '.join(reason.splitlines())}", file=sys.stderr)
+    """Prints one line on stderr for each reason, with the channels that failed for it, and returns the exit code."""
+    for reason in dict.fromkeys(failed.values()):
+        channels = [channel for channel, each in failed.items() if each == reason]
+        print(f"error: {spoken(channels)}: {' '.join(reason.splitlines())}", file=sys.stderr)
     return 2 if failed else 0
 
 
@@ -58,7 +60,8 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     if out.suffix in suffixes and not is_folder:
         if len(names) > 1:
             raise InputError(
-                f"Expected a folder for {len(names)} files ({printable('; '.join(names[:8]))}). Received: --out {out}. Give a folder, or choose one (--channel, --column)."
+                f"Expected a folder for {len(names)} files ({printable('; '.join(names[:8]))}). Received: --out {out}. Give a folder, or choose "
+                "one with --column (of `generate`, with --channel)."
             )
         make_folder(out.parent)
         return {names[0]: out}
@@ -91,7 +94,7 @@ def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict
     used = {channel for channels in found.values() for channel in channels}
     if not found:
         known = printable("; ".join(", ".join(channels) for channels in list(wanted.values())[:8]))
-        raise InputError(f"Expected fitted channels: {known}. Received: {', '.join(series[:8])}. Select the channels with --column.")
+        raise InputError(f"Expected fitted channels: {known}. Received: {', '.join(series[:8])}. Give telemetry with these columns.")
     others = [name for name in series if name not in used]
     if others:
         tell(f"columns without a fitted simulator, left out: {printable(', '.join(others[:8]))}")
@@ -129,4 +132,10 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."
         )
     columns = simulator.alignment.columns
-    return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)
+    try:
+        return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)
+    except InputError:
+        if not set(columns) <= set(read_source(options.source, None, options.time, cleaning)):
+            raise
+        what = f"{options.coarse} without its columns, which {options.source} has"
+        raise InputError(f"Expected the run of {simulator.alignment.name} as --coarse. Received: {what}. Swap the two.") from None

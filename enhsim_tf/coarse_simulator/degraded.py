@@ -44,6 +44,10 @@ class Degraded:
         if not (0 <= self.severity <= 1 and 0 <= self.onset < 1):
             raise InputError(f"Expected 0 <= severity <= 1 and 0 <= onset < 1. Received: {self}.")
 
+    def __str__(self) -> str:
+        """The mode as it is written on the command line."""
+        return f"{'' if self.channel is None else self.channel + '='}{self.mode}:{self.severity:g}:{self.onset:g}"
+
     def first_sample(self, num_samples: int) -> int:
         """Sample at which the degradation of a window or series of this length starts."""
         return int(round(self.onset * num_samples, 6))  # rounded first, since 0.29 * 100 is 28.999999999999996

@@ -64,6 +64,8 @@ def check_folder(folder: Path, plan: Plan) -> None:
 
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Reads and validates the manifest of a data set. Its `shards` are returned as `Record`s, or None if it is not finished."""
+    if not os.path.isfile(folder / MANIFEST):
+        raise InputError(f"Expected a data set of `generate --workers`. Received: {folder}, which has no {MANIFEST}. Give another folder.")
     try:
         content = read_json(folder / MANIFEST, _MOST_BYTES)
         settings, shards = content["settings"], content["shards"]
@@ -75,8 +77,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         reason = f"{type(error).__name__}: {' '.join(str(error).split())[:120]}"
         raise InputError(
-            f"Expected a data set of `generate` of the format {FORMAT}. Received: {folder}, whose {MANIFEST} is missing, damaged or another "
-            f"one ({reason}). Give another folder, or remove this one and run `generate` again."
+            f"Expected a data set of `generate` of the format {FORMAT}. Received: {folder}, whose {MANIFEST} is damaged or another one "
+            f"({reason}). Give another folder, or remove this one and run `generate` again."
         ) from None
     return content
 

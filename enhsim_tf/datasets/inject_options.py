@@ -46,6 +46,9 @@ class InjectOptions:
 
     def __post_init__(self):
         low, high = self.severity
+        unknown, known = [kind for kind in self.kinds if kind not in (*INJECTIONS, *JOINT_KINDS)], ", ".join((*INJECTIONS, *JOINT_KINDS))
+        if unknown:
+            raise InputError(f"Expected kinds of anomaly among {known}. Received: {unknown[0]!r}. Name one of these.")
         if self.is_joint and set(self.kinds) - set(JOINT_KINDS):
             kinds = ", ".join(self.kinds)
             raise InputError(f"Expected kinds among {', '.join(JOINT_KINDS)}. Received: {kinds}. Inject other kinds on their own.")
@@ -58,7 +61,7 @@ class InjectOptions:
         if not (0 <= low <= high and (high < np.inf or low == high)):
             raise InputError(f"Expected severities from 0 on, the least first. Received: {low:g}:{high:g}.")
         if not self.kinds and not self.at:
-            raise InputError(f"Expected kinds of anomaly or places. Received: neither. Give --kinds, of {', '.join(INJECTIONS)}, or --at.")
+            raise InputError(f"Expected kinds of anomaly or places. Received: neither. Give --kinds, of {known}, or --at.")
         if self.number is not None and (not 1 <= self.number <= _MOST or not self.kinds):
             raise InputError(f"Expected 1 to {_MOST:,} anomalies with drawn places, of given kinds. Received: number={self.number}.")
         if self.noise_sd is not None and not 0 < self.noise_sd < np.inf:

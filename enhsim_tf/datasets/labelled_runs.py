@@ -23,8 +23,9 @@ _OWN = ("copy", "time", "sample", "value", "out_of_range")
 def write_copies(path: str | os.PathLike, model: EnhancedSimulator, run: Recording, num_copies: int, seed: int = 0) -> int:
     """Writes copies of a run to one Parquet file, which appears only when it is complete, and returns the number of rows.
 
-    The columns are `copy` (from 0), `time` (of the telemetry, that is with the delay of the model; `sample` if the run has no
-    times), `value` (of several channels, their names), `out_of_range` (above 1, the coarse run is outside the training range), and the carried columns of the run.
+    The columns are `copy` (from 0), `time` (of the telemetry, that is with the delay of the model, in seconds if the clock counts from zero;
+    `sample` if the run has no times), `value` (of several channels, their names), `out_of_range` (above 1, the coarse run is outside the
+    training range), and the carried columns of the run.
 
     Args:
         path: Path of the file.
@@ -65,11 +66,13 @@ def _shared_columns(model: EnhancedSimulator, usable: Recording) -> tuple[dict[s
     clocks = [usable.clock(part) for part in usable.parts]
     delay_s = model.alignment.delay_s
     times = np.concatenate([nanoseconds(dataclasses.replace(each, offset_s=each.offset_s + delay_s)) for each in clocks])
-    has_time = usable.start is not None
-    time = {"time": pa.array(times, pa.timestamp("ns", tz="UTC"))} if has_time else {"sample": pa.array(times // 10**9)}
+    stamps = pa.array(times / 1e9) if usable.clock().counts else pa.array(times, pa.timestamp("ns", tz="UTC"))
+    time = {"sample": pa.array(times // 10**9)} if usable.start is None else {"time": stamps}
     others = {"out_of_range": pa.array(np.concatenate([trusted.score_run(part.values) for part in usable.parts]))}
     for name in usable.parts[0].carried:
         cells = pd.concat([pd.Series(part.carried[name]).reset_index(drop=True) for part in usable.parts], ignore_index=True)
+        if name.split(" ")[0] == "mask" and cells.isin([0, 1]).all():
+            cells = cells.astype(bool)  # a CSV file may write a mask as 0 and 1
         try:
             column = pa.array(cells, from_pandas=True)
         except (pa.ArrowException, TypeError, ValueError):  # cells of several types, such as numbers and words

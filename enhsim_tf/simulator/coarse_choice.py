@@ -70,8 +70,8 @@ def choose_coarse(
     fitting = _fitting_window(parts, wanted, wanted if window else FEWEST_SAMPLES)
     if not fitting:
         raise InputError(
-            f"Expected at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from. Received: {len(values)} samples of "
-            f"{name}, the longest part {len(longest)}. Give more telemetry or a smaller window."
+            f"Expected at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from. Received: {len(values):,} samples of "
+            f"{name} that are not held out, the longest part {len(longest):,}. Give more telemetry, or a smaller --window or --held-out."
         )
     if traces is not None and by_commands:
         said = (
@@ -97,8 +97,8 @@ def _square_wave(telemetry: Telemetry) -> tuple[SquareWaveSimulator | None, str,
     period = coarse.waves[0].period_s / telemetry.interval_s
     explained = 1 - np.var(values - coarse(telemetry.time_s)) / np.var(values, dtype=np.float64)
     said = (
-        f"a square wave with a period of {coarse.waves[0].period_s:.5g} {telemetry.time_unit}, which occurs {samples / period:.1f} times and "
-        f"explains {explained:.0%} of the variance"
+        f"a square wave with a period of {coarse.waves[0].period_s:.5g} {telemetry.time_unit}, which occurs {samples / period:.1f} times in the longest "
+        f"part without a gap and explains {explained:.0%} of the variance there"
     )
     if explained < max(_LEAST_EXPLAINED, _CHANCE / samples):
         return None, f"the best square wave explains only {max(explained, 0):.1%} of its variance", period, explained

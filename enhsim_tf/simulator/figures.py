@@ -82,25 +82,29 @@ def report_figure(report: Report) -> matplotlib.figure.Figure:
 
 def score_figure(frame: pd.DataFrame, simulator: EnhancedSimulator, name: str) -> matplotlib.figure.Figure:
     """Draws the scores that `scoring.score` returns: series, enhanced run if there is one, scores and events; `name` is that of the source."""
-    single = len(simulator.channels) == 1
-    channels = ["value"] if single else list(simulator.channels[:_MOST_CHANNELS])
-    number = len(events_table(frame))
-    title = f"{drawable(name, 30)}: {number:,} {'event' if number == 1 else 'events'}, {frame['flag'].mean():.1%} of samples flagged"
+    single, number = len(simulator.channels) == 1, len(events_table(frame))
+    channels = ["value"] if single else _shown_channels(frame, simulator)
+    share = frame["flag"].sum() / max(1, frame["score"].notna().sum())
+    title = f"{drawable(name, 30)}: {number:,} {'event' if number == 1 else 'events'}, {share:.1%} of scored samples flagged"
     subtitle = f"Detector: {frame.attrs['detector']}. Shaded: events. Dashed: threshold."
+    if len(channels) < len(simulator.channels):
+        subtitle += f" Drawn: the {len(channels)} of {len(simulator.channels)} channels that depart most."
     rows, times = len(channels) + 1, told_times(frame)
     has_time = hasattr(times, "tz")
     times = times.tz_convert(None) if has_time and times.tz is not None else times
+    steps = np.diff(np.asarray(times)).astype(np.float64)
+    gaps = 1 + np.flatnonzero(steps > 1.5 * np.median(steps))  # the samples after a gap
     with matplotlib.style.context(STYLE):
         figure, down = new_sheet(DOUBLE, 1.0 + 1.15 * rows, title, subtitle)
         axes = panels(figure, down + 0.2, rows, 1, sharex=True)[:, 0]
         for row, channel in enumerate(channels):
-            _curve(axes[row], times, frame[channel].to_numpy(), REAL, 0.6)
+            _curve(axes[row], times, frame[channel].to_numpy(), REAL, 0.6, gaps)
             enhanced = "enhanced" if single else f"enhanced {channel}"
             if enhanced in frame:
-                _curve(axes[row], times, frame[enhanced].to_numpy(), ENHANCED, 1.0)
+                _curve(axes[row], times, frame[enhanced].to_numpy(), ENHANCED, 1.0, gaps)
                 title_words(axes[row], [("telemetry", REAL), ("enhanced run", ENHANCED)] if row == 0 else [])
-            axes[row].set_ylabel(drawable(simulator.channels[row], 14))
-        _curve(axes[-1], times, frame["score"].to_numpy(), REAL, 0.7)
+            axes[row].set_ylabel(drawable(simulator.channels[0] if single else channel, 14))
+        _curve(axes[-1], times, frame["score"].to_numpy(), REAL, 0.7, gaps)
         axes[-1].axhline(1, color=QUIET, linewidth=0.8, linestyle=DASHED)
         axes[-1].set_ylabel("score")
         if np.nanmax(frame["score"].to_numpy(), initial=0.0) > 20:
@@ -122,13 +126,27 @@ def _foot(figure: matplotlib.figure.Figure, text: str) -> None:
     figure.text(EDGE / DOUBLE, 0.08 / figure.get_size_inches()[1], text, size=7, color=QUIET)
 
 
-def _curve(axes, times, values: np.ndarray, color: str, width: float) -> None:  # noqa: ANN001
-    """Draws a series; of a long one the envelope, so that no spike is lost."""
+def _shown_channels(frame: pd.DataFrame, simulator: EnhancedSimulator) -> list[str]:
+    """The channels that are drawn: of many, those that add most to the Mahalanobis distance of the flagged samples from nominal telemetry."""
+    names, some = list(simulator.channels), frame[frame["flag"] if frame["flag"].any() else frame["score"].notna()]
+    if len(names) <= _MOST_CHANNELS or simulator.nominal is None:
+        return names[:_MOST_CHANNELS]
+    nominal = np.concatenate(simulator.judged_series(simulator.nominal, simulator.nominal_run)).astype(np.float64)
+    left = some[names].to_numpy() - (some[[f"enhanced {name}" for name in names]].to_numpy() if simulator.is_run_model else 0.0)
+    unit = np.maximum(nominal.std(axis=0), 1e-9)
+    inverse = np.linalg.pinv(np.cov(nominal / unit, rowvar=False))
+    size = np.mean(((left - nominal.mean(axis=0)) / unit @ inverse) ** 2, axis=0) / np.diag(inverse)
+    return [names[place] for place in sorted(np.argsort(-size, kind="stable")[:_MOST_CHANNELS])]
+
+
+def _curve(axes, times, values: np.ndarray, color: str, width: float, gaps: np.ndarray) -> None:  # noqa: ANN001
+    """Draws a series with a break before each of the samples `gaps`; of a long one the envelope, so that no spike is lost."""
+    times = np.asarray(times)
     if len(values) > _MOST_POINTS:
-        edges = np.linspace(0, len(values), _MOST_POINTS // 2 + 1).astype(int)[:-1]
+        edges = np.union1d(np.linspace(0, len(values), _MOST_POINTS // 2 + 1).astype(int)[:-1], gaps)
         low, high = np.fmin.reduceat(values, edges), np.fmax.reduceat(values, edges)
-        times, values = np.repeat(np.asarray(times)[edges], 2), np.stack([low, high], axis=1).ravel()
-    axes.plot(times, values, color=color, linewidth=width)
+        times, values, gaps = np.repeat(times[edges], 2), np.stack([low, high], axis=1).ravel(), 2 * np.searchsorted(edges, gaps)
+    axes.plot(np.insert(times, gaps, times[gaps]), np.insert(values, gaps, np.nan), color=color, linewidth=width)
 
 
 def drawable(text: str, most_letters: int) -> str:

@@ -92,28 +92,31 @@ def fit_channels(
         InputError: Before any fit, if a channel's name cannot be used for a folder or an output folder contains something other
             than a saved simulator. Also if the engine is not available or a simulator cannot be written.
     """
-    out = make_folder(out)
-    if (out / MANIFEST).is_file():
+    here, speaks = Path(os.path.abspath(out)), speaks and engine == "local"
+    if (here / MANIFEST).is_file():
         raise InputError(
             f"Expected a folder for models. Received: {out}, which is a model itself. Give another --out, or its parent folder."
         )
-    here, speaks = Path(os.path.abspath(out)), speaks and engine == "local"
     groups = [{name: each} for name, each in series.items()] if separately else [dict(series)]
     jobs = [Job(group, here, options, cleaning, speaks, read_run, commands) for group in groups]
     for job in jobs:
         for name in (job.name, *job.series):
             refuse_foreign(folder_of(here, name))
-    remove_leftovers(out)
+    new_folders = [each for each in (here, *here.parents) if not each.exists()]
     reports: dict[str, dict] = {}
     failed: dict[str, str] = {}
     in_this_process = workers == 0 or (len(jobs) == 1 and engine == "local")
     try:
+        remove_leftovers(make_folder(here))
         for outcome in map(fit_or_say, jobs) if in_this_process else _fitted_by_processes(jobs, engine, workers):
             reports, failed = reports | outcome.reports, failed | outcome.failed
             for line in outcome.lines:
                 tell(line)
     finally:
-        remove_leftovers(out)  # temporary files of workers that were killed
+        remove_leftovers(here)  # temporary files of workers that were killed
+        with contextlib.suppress(OSError):
+            for folder in new_folders:
+                folder.rmdir()  # only if it is empty, because nothing was fitted
     return reports, {name: failed[name] for name in series if name in failed}
 
 

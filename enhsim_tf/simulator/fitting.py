@@ -36,6 +36,7 @@ _NUM_LEVELS = 500  # most windows whose offset and gain are kept
 _LEAST_FOLLOWED = 0.1  # share of the windows that have to follow a square wave for a shape to be learnt from them
 _MOST_VALUES = 1_500_000  # of all training windows, which bounds time and memory of a fit of many channels
 _LEAST_WINDOWS = 300  # training windows, however many channels
+_SHORT = "a window of {:,} samples is shorter than a period of {:,.0f}: level and gain are fitted to each window, so a slow fault can look nominal"
 _LEAST_SPAN, _MOST_SIZE = 1e-12, 1e15  # beyond them, squares of the noise or of the values leave the range of float32
 
 
@@ -117,8 +118,8 @@ def _fit_waves(
         usable = long_enough(learnt, window)
         if usable is None or len(usable) < LEAST_LEARNT * window:
             raise InputError(
-                f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {len(learnt):,} samples of "
-                f"{recording.name}, the longest part {max(map(len, learnt.parts)):,}. Give more telemetry or a smaller window."
+                f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {len(learnt):,} samples of {recording.name} that are "
+                f"not held out, the longest part {max(map(len, learnt.parts)):,}. Give more telemetry, or a smaller --window or --held-out."
             )
         try:
             return _fit_aligned(usable, long_enough(held_out, window), choices, window, options, progress, said)
@@ -137,7 +138,7 @@ class _FlatError(Exception):
 def _split(recording: Recording, share: float) -> tuple[Recording, Recording | None, str]:
     """Splits off the held-out end. Nothing is held out if the rest could not be learnt from; the text says so."""
     learnt, held_out = split_end(recording, share)
-    if share and len(learnt) < LEAST_SAMPLES <= len(recording):
+    if share and len(learnt) < LEAST_SAMPLES:
         return recording, None, f"Nothing is held out, because the record has only {len(recording):,} samples."
     if share and (np.ptp(learnt.values, axis=0) == 0).any():
         return recording, None, f"Nothing is held out, because the first {1 - share:.0%} of the record is constant."
@@ -175,6 +176,8 @@ def _fit_aligned(
     step = max(1.0, (places[-1] - places[0]) / max(1, len(places) - 1))
     levels = np.stack([shift, gain], axis=2)[followed]
     simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, levels=levels, nominal=learnt, level_step=step)
+    period = max((each.waves[0].period_s for each in waves.simulators if not each.is_constant), default=0.0) / learnt.interval_s
+    notes = [_SHORT.format(window, period)] if window < period else []
 
     def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
         windows = windows_of(some, places, window)
@@ -183,7 +186,7 @@ def _fit_aligned(
 
     everything = noise_windows(learnt, random_window_starts(learnt.parts, window, number, np.random.default_rng([options.seed, 1])))
     halves = [_evenly(each, window, number, noise_windows) for each in split_end(learnt, JUDGED_SHARE)]
-    return _finish(simulator, choice, halves, everything, options, held_out, None, said, [], progress)
+    return _finish(simulator, choice, halves, everything, options, held_out, None, said, notes, progress)
 
 
 def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tuple[Waves, np.ndarray, np.ndarray, np.ndarray]:

@@ -15,10 +15,14 @@ LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
 _WINDOWS_IN_RECORD = 20  # without a period, the default window is this share of the record
 
 
-def _option(
-    default: Any, help_text: str, *, least: float | None = None, most: float | None = None, choices: tuple[str, ...] = (), kind: type = int
-):  # noqa: ANN202
-    return dataclasses.field(default=default, metadata={"help": help_text, "least": least, "most": most, "choices": choices, "kind": kind})
+def _option(default: Any, help_text: str, **limits: Any):  # noqa: ANN202
+    known = {"help": help_text, "least": None, "most": None, "choices": (), "kind": int, "option": None}
+    return dataclasses.field(default=default, metadata=known | limits)
+
+
+def option_of(name: str) -> str:
+    """The option of the commands for a field, for example `--held-out` for `held_out`."""
+    return "--" + name.removesuffix("_s").replace("_", "-")
 
 
 def _check(field: dataclasses.Field, value: Any) -> None:
@@ -34,7 +38,9 @@ def _check(field: dataclasses.Field, value: Any) -> None:
     if not is_number or (low is not None and not value >= low) or (high is not None and not value <= high):
         what = "a whole number" if limits["kind"] is int else "a number"
         span = "" if low is None else f" of at least {low:g}" if high is None else f" from {low:g} to {high:g}"
-        raise InputError(f"Expected {field.name} to be {what}{span}. Received: {field.name}={value!r}.")
+        raise InputError(
+            f"Expected {field.name} ({limits['option'] or option_of(field.name)}) to be {what}{span}. Received: {value!r}. Choose another."
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,7 +108,7 @@ class ScoreOptions:
     """
 
     detector: str | None = None
-    num_windows: int = _option(2_000, "generated windows from which the detector learns (default: 2000)", least=10)
+    num_windows: int = _option(2_000, "generated windows from which the detector learns (default: 2000)", least=10, option="--windows")
     false_alarm_rate: float = _option(0.01, "share of nominal samples to flag (default: 0.01)", least=1e-9, most=0.5, kind=float)
     seed: int = _option(0, "random seed (default: 0)", least=0, most=2**31 - 1)
 
@@ -124,7 +130,7 @@ def add_options(parser: argparse.ArgumentParser, options: type, *names: str) -> 
         else:
             metavar = {"held_out": "SHARE", "false_alarm_rate": "SHARE", "delay_s": "SECONDS"}.get(name, "N")
             given = {"type": about["kind"], "default": default, "metavar": metavar}
-        parser.add_argument("--" + name.removesuffix("_s").replace("_", "-"), dest=name, help=about["help"], **given)
+        parser.add_argument(option_of(name), dest=name, help=about["help"], **given)
 
 
 def options_from(namespace: argparse.Namespace, options: type) -> Any:

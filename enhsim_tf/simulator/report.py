@@ -18,6 +18,7 @@ from enhsim_tf.simulator.trusted_range import TrustedRange
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 _NUM_WINDOWS = 500  # windows on which errors and noise are measured
+_LEAST_RECALL = 0.3  # of injected anomalies; below it, the report warns
 _FLOORS = 3.0  # cross-correlations further apart than this multiple of the floor are said to differ
 
 
@@ -47,7 +48,7 @@ class Report:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "examples"}
 
     def lines(self) -> list[str]:
-        """Returns the report as lines of text: the warning, if there is one, comes first."""
+        """Returns the report as lines of text: warnings come first."""
         name = spoken(self.channels)
         where = "held-out time" if self.is_held_out else "the telemetry of the fit (none was held out)"
         found = [
@@ -72,6 +73,12 @@ class Report:
             found.append(
                 f"WARNING: no detector keeps its promise; the best, {self.detector}, flags {alarms:.0%} of nominal telemetry at {RATE:.0%} set. "
                 "Do not trust its alarms"
+            )
+        (recall,) = [each["recall"] for each in self.detectors if each["name"] == self.detector]
+        if recall < _LEAST_RECALL:
+            found.append(
+                f"WARNING: {self.detector}, the detector that score uses, finds only {recall:.0%} of the injected anomalies, so a fault can go unseen. "
+                "Compare the line of the detectors; another --window, or --detector of score, may find more"
             )
         used = next((each for each in self.noise_candidates if each["is_chosen"]), None)
         if used is not None and (used["auc"] or 0) > TOLD_APART:

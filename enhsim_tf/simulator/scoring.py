@@ -228,9 +228,10 @@ def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
         )
     if abs(telemetry.interval_s - simulator.interval_s) > SAME_RATE * simulator.interval_s:
+        given = (f"every {telemetry.interval_s:g} s", "the same sampling interval, or --interval")
+        received, give = given if telemetry.start is not None else ("samples without times", "a time column")
         raise InputError(
-            f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: every {telemetry.interval_s:g} s. "
-            "Give telemetry with the same sampling interval, or --interval."
+            f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: {received}. Give telemetry with {give}."
         )
     if simulator.is_run_model and run is None:
         raise InputError(

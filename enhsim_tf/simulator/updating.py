@@ -21,7 +21,7 @@ _NUM_WINDOWS = 300  # of the held-out end, on which errors are measured
 
 @dataclasses.dataclass(frozen=True)
 class UpdateReport:
-    """What an update changed: the state of the old and of the new simulator on the held-out end of the new telemetry."""
+    """What an update changed: what each simulator was fitted with, and its errors and alarms on the held-out end of the new telemetry."""
 
     channels: list[str]
     num_samples: int
@@ -84,9 +84,8 @@ def _state(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | 
     real, clean = simulator.windows_and_signal(telemetry, run, _NUM_WINDOWS)
     found: dict[str, Any] = {"level": {}, "gain": {}, "period_s": {}}
     if run is None:
-        _, shift, gain = simulator.alignment.align(real)
-        for channel, (name, wave) in enumerate(zip(simulator.channels, simulator.alignment.simulators, strict=True)):
-            found["level"][name], found["gain"][name] = (float(np.median(each[:, channel])) for each in (shift, gain))
+        waves = zip(simulator.channels, simulator.alignment.simulators, np.median(simulator.levels, axis=0).tolist(), strict=True)
+        for name, wave, (found["level"][name], found["gain"][name]) in waves:
             if not wave.is_constant:
                 found["period_s"][name] = float(wave.waves[0].period_s)
     for what, each in (("nrmse", nrmse(clean, real)), ("noise_sd", simulator.noise_sd)):

@@ -337,7 +337,14 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
     code, out, errors = told("fit", "WORLD/still.csv", "--out", "models", *options, *TINY)
     assert code == 2 and [line.split(": ")[1] for line in errors] == ["volts", "amps"] and out == "reading ...\n"
     assert all(": Expected " in line and "constant" in line for line in errors)
-    assert not list((tmp_path / "models").iterdir())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_fit_that_fails_says_it_once_and_leaves_no_new_folder(told, tmp_path):
+    (tmp_path / "old" / "empty").mkdir(parents=True)
+    code, _, errors = told("fit", "WORLD/two.csv", "--coarse", "RUNS/later.csv", "--out", "old/new/models")
+    assert (code, len(errors)) == (2, 1) and errors[0].startswith("error: volts, amps: Expected a coarse run that overlaps")
+    assert [path.name for path in tmp_path.rglob("*")] == ["old", "empty"]
 
 
 def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
@@ -459,14 +466,31 @@ WRONG = {
     "channel that was not fitted": ([*GENERATE, "--windows", "5", "--channel", "amps"], "'amps'"),
     "one file for two channels": (["generate", "WORLD/models", "--windows", "5", "--out", "x.parquet"], "2 files"),
     "output of a name no file can have": (["generate", "WORLD/single", "--windows", "5", "--out", "x" * 300 + ".parquet"], "long"),
-    "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "false_alarm_rate"),
+    "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "(--false-alarm-rate)"),
+    "hardly any windows": ([*SCORE, "--windows", "9"], "(--windows)"),
+    "a percentage of held-out time": ([*FIT, "--held-out", "20"], "(--held-out)"),
+    "a window longer than the telemetry": ([*FIT, "--window", "2000"], "--window"),
+    "verify a model": (["verify", "WORLD/single"], "which has no _manifest.json. Give another folder."),
+    "scores of half of the channels": (["score", "WORLD/joint", "WORLD/one.csv", "--out", "x.csv"], "Give telemetry with these columns."),
+    "scores without a clock": (
+        [*SCORE[:2], "WORLD/still.csv", "--column", "volts", "--out", "x.csv"],
+        "Give telemetry with a time column.",
+    ),
+    "an interval without a clock": (
+        [*SCORE[:2], "WORLD/still.csv", "--column", "volts", "--interval", "10", "--out", "x.csv"],
+        "or leave it out.",
+    ),
+    "telemetry and run swapped": (
+        ["score", "RUNS/models", "RUNS/run.csv", "--column", "volts", "--coarse", "RUNS/new.csv", "--out", "x.csv"],
+        "Swap the two.",
+    ),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
     "update where a simulator is": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/models"], "--replace"),
     "a delay without a run": ([*FIT, "--delay", "3"], "--delay without --coarse"),
     "windows of a run": ([*COPIES, "--windows", "2"], "--windows with --coarse"),
     "a scenario of a model of runs": (
         ["generate", "RUNS/models", "--windows", "4", "--scenario", "stuck:0.5", "--out", "x.parquet"],
-        OF_RUNS,
+        f"Received: stuck:0.5:0.25. Simulate it and give the run: {OF_RUNS}",
     ),
     "an event in a series of it": (["generate", "RUNS/models", "--continuous", "1h", "--at", "stuck@10/20", "--out", "x.parquet"], OF_RUNS),
     "one in a large data set of it": (
@@ -477,6 +501,11 @@ WRONG = {
     "scores without a run": (["score", "RUNS/models", "RUNS/new.csv", "--out", "x.parquet"], "Expected --coarse"),
     "a run of another time": (["score", "RUNS/models", "RUNS/new.csv", "--coarse", "RUNS/later.csv", "--out", "x.parquet"], "in time"),
     "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
+    "inject an unknown kind": (
+        [*INJECT, "--kinds", "spikes,delay"],
+        "gain, another_time, delay, lost_coupling, common_shift. Received: 'spikes'",
+    ),
+    "inject into one file for two channels": (["inject", "WORLD/two.csv", "--kinds", "ramp", "--out", "x.csv"], "one with --column (of"),
     "inject into the telemetry itself": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "WORLD/one.csv"], "for both"),
     "inject TimeEval's table as Parquet": ([*INJECT[:-1], "x.parquet", "--kinds", "ramp", "--timeeval"], "x.parquet"),
 }
@@ -534,7 +563,7 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
         while True:
             os.killpg(process.pid, 0)
             time.sleep(0.1)
-    assert not list((tmp_path / "models").iterdir())
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(("module", "said"), [("ray", "said"), ("json", "said, and more")])

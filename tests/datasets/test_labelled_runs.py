@@ -1,5 +1,6 @@
 """Copies of recorded runs on disk: every label stays with its sample, and nothing half written is left."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,6 +49,17 @@ def test_every_row_has_its_time_and_labels(tmp_path):
 def test_times_are_those_of_the_telemetry(tmp_path):
     write_copies(tmp_path / "out.parquet", model(delay_s=25.0), run(), 1)
     assert pd.read_parquet(tmp_path / "out.parquet")["time"].iloc[0] == pd.Timestamp(START) + pd.Timedelta("25s")
+
+
+def test_a_clock_from_zero_is_in_seconds_and_a_mask_of_ones_is_boolean(tmp_path):
+    counting = run()
+    parts = tuple(
+        dataclasses.replace(part, carried={"mask": np.arange(len(part)) % 2, "masked": np.ones(len(part), int)}) for part in counting.parts
+    )
+    write_copies(tmp_path / "out", model(delay_s=25.0), dataclasses.replace(counting, parts=parts, start="1970-01-01T00:00:00+00:00"), 1)
+    frame = pd.read_parquet(tmp_path / "out")
+    assert frame["time"].tolist() == [25.0 + 10 * place for place in (*range(20), *range(40, 52))]
+    assert frame["mask"].dtype == bool and frame["mask"].tolist() == [False, True] * 16 and frame["masked"].tolist() == [1] * 32
 
 
 def test_same_seed_same_bytes_and_fewer_copies_are_the_first_ones(tmp_path):

@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,13 @@ def test_quantised_channels_stay_on_their_levels():
     np.testing.assert_allclose(values, np.round(values), atol=1e-4)
 
 
+@pytest.mark.parametrize(("window", "is_short"), [(36, True), (44, False)])
+def test_the_report_says_how_often_a_period_occurs_and_whether_a_window_is_shorter(window, is_short):
+    _, report = fit(series(1_000), options=dataclasses.replace(QUICK, window=window))
+    assert "which occurs 20.0 times in the longest part without a gap" in report.coarse  # 800 of the samples are not held out
+    assert [note.partition(":")[0] for note in report.notes] == ["a window of 36 samples is shorter than a period of 40"] * is_short
+
+
 @pytest.mark.parametrize("name", ["none", "gaussian", "autoregression", "residual windows", "matched residual windows"])
 def test_the_noise_that_is_asked_for_is_used(name):
     simulator, report = fit(joint(1_500), options=FitOptions(window=64, num_windows=100, noise=name, held_out=0.0))
@@ -72,11 +81,11 @@ def test_the_noise_that_is_asked_for_is_used(name):
     ("words", "telemetry", "others"),
     [
         ("constant 1", Telemetry(np.ones(1_000, np.float32)), {}),
-        ("at least 256 samples", series(200), {}),
+        ("at least 256 samples, 8 windows of 32. Received: 200 of volts", series(200), {}),
         ("at least one channel", {}, {}),
         ("2 groups", {"a": series(), "b": Telemetry(series().values, 1.0, 0.0, series().start)}, {}),
         ("overlaps the telemetry", series(), {"coarse": coarse_run(start="2031-01-01T00:00:00+00:00")}),
-        ("8 windows of 500", series(), {"options": FitOptions(window=500)}),
+        ("8 windows of 500 .* 2,400 samples of volts that are not held out", series(), {"options": FitOptions(window=500)}),
     ],
 )
 def test_telemetry_that_cannot_be_fitted_is_refused(words, telemetry, others):

@@ -150,7 +150,7 @@ def test_a_known_damage_is_repaired_and_reported(name):
 
 
 BAD_VALUES = {
-    "a unit behind one number": (set_rows([7], "1.5 V"), "'1.5 V' at row 7"),
+    "a unit behind one number": (set_rows([7], "1.5 V"), "'1.5 V' at row 7 of volts (1 in all)"),
     "commas and points": (set_rows([7, 8], ["1,5", "1.5"]), "'1,5' at row 7"),
     "thousands or thousandths": (with_times(TIMES, ["1,500", "2,250"] * (N // 2)), "'1,500' at row 0"),
     "beyond float32": (set_rows([7], 1e39, float), "1e+39 at row 7"),
@@ -172,7 +172,7 @@ BAD_VALUES = {
     "one index of two levels": (with_times(pd.MultiIndex.from_product([["a"], TIMES])), "MultiIndex"),
 }
 BAD_TIMES = {
-    "words": (with_times(["noon"] * N), "'noon' at row 0"),
+    "words": (with_times(["noon"] * N), "'noon' at row 0 of the times of volts (400 in all)"),
     "days with two-digit years": (with_times(TIMES.strftime("%d/%m/%y %H:%M:%S")), "time_format"),
     "dates as numbers": (with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)), "time_format '%Y%m%d'"),
     "numbers of no unit": (with_times(np.arange(N) + 10**10), "time_format"),
@@ -223,7 +223,7 @@ def test_options_out_of_range_are_refused(refused, name):
 def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused):
     with refused("'Mars/Gale'"):
         clean(CLEAN.tz_localize(None), Cleaning(timezone="Mars/Gale"))
-    with refused("interval_s=2"):
+    with refused("interval_s (--interval)"):
         clean(VALUES, Cleaning(interval_s=2))
 
 

@@ -66,7 +66,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     if has_time:
         log, rows = _rows_with_times(series.index, values, name, options, about)
     elif options.interval_s is not None:
-        raise InputError(f"Expected interval_s with times only. Received: interval_s={options.interval_s} with {name}, which has none.")
+        raise InputError(f"Expected times with interval_s (--interval). Received: {name} without any. Give a time column, or leave it out.")
     else:
         no_clock = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
         log = CleaningLog(None, [no_clock, *map(finding_from_dict, about.get("findings", ()))], places)

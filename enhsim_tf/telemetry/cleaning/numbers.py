@@ -65,8 +65,8 @@ def parse_numbers(
         row = int(np.argmax(bad | beyond))
         expected = f"values that float32 holds, up to {_LARGEST:.1e}" if beyond[row] else "numbers"
         raise InputError(
-            f"Expected {expected}. Received: {format_cell(values.iloc[row])} at {places.of(row)} of {what}, and "
-            f"{int((bad | beyond).sum()) - 1:,} more. {_advice(values.iloc[row])}"
+            f"Expected {expected}. Received: {format_cell(values.iloc[row])} at {places.of(row)} of {what} "
+            f"({int((bad | beyond).sum()):,} in all). {_advice(values.iloc[row])}"
         )
     return np.where(bad | beyond, np.nan, parsed), bad | beyond, findings
 

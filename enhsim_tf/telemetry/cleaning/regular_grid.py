@@ -266,7 +266,7 @@ def _build_parts(
         longest = max(int(segment.places[-1]) + 1 for segment in segments)
         raise InputError(
             f"Expected regular samples, at least {options.min_part} in a row. Received: {longest} at most, every {interval / 1e9:.6g} s, in {name}. "
-            "Give interval_s (--interval), a longer max_fill (--max-fill) or a shorter min_part."
+            "Give interval_s (--interval), a longer max_fill (--max-fill), or a smaller min_part (of `fit`, --window)."
         )
     _log_breaks(rows, segments, interval, log, options.longest_gap)
     _log_jitter(rows, off, interval, log)

@@ -88,8 +88,8 @@ class _Reader:
         except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
             received = "a time out of range"
         raise InputError(
-            f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {self.places.of(row)} of {self.what}, and "
-            f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
+            f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {self.places.of(row)} of {self.what} "
+            f"({int(bad.sum()):,} in all). {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
         )
 
     def of_dates(self, times: pd.Series) -> Times:
