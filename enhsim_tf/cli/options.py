@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.atomic_files import make_folder
@@ -123,7 +122,7 @@ def run_for(simulator: EnhancedSimulator, options: argparse.Namespace, cleaning:
             raise InputError(
                 f"Expected an array with commands, as in the fit. Received: {options.source}, which has none. Give such an array."
             )
-        return CommandTraces.from_config(commands).recording(found)
+        return commands.recording(found)
     if options.coarse is None:
         raise InputError(
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."
