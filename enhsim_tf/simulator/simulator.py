@@ -422,6 +422,7 @@ class EnhancedSimulator:
             "levels": (self.levels is None) == self.is_run_model,
             "quantisation": len(self.quantisation) == size,
             "nominal": self.nominal is None or (self.nominal.columns, self.nominal.interval_s) == (self.channels, self.interval_s),
+            "parts": len({tuple(map(len, each.parts)) for each in recordings}) <= 1,
             "start": all(isinstance(each.start, str | None) for each in recordings),
             "runs": all(run.values.dtype == np.float32 and np.isfinite(run.offset_s) for run in runs),
         }
