@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.atomic_files import make_folder
@@ -126,7 +125,7 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
                 f"Expected an array with commands, as in the fit. Received: none beside {next(iter(series))} in {options.source}. "
                 "Give such an array, and no other column than 0."
             )
-        return CommandTraces.from_config(commands).recording(series.commands)
+        return commands.recording(series.commands)
     if options.coarse is None:
         raise InputError(
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."

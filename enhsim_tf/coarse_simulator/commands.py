@@ -4,8 +4,7 @@ A command is one sample long, but its effect lasts: its trace rises by 1 when th
 telemetry best.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -57,15 +56,6 @@ class CommandTraces:
     def recording(self, commands: np.ndarray) -> Recording:
         """Returns the coarse run of telemetry without times, whose samples are counted from 0; see `traces`."""
         return Recording((Run(self.traces(commands)),), self.columns, name="the commands")
-
-    def get_config(self) -> dict[str, Any]:
-        """Returns the settings in plain JSON types."""
-        return {"chosen": [list(each) for each in self.chosen]}
-
-    @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> "CommandTraces":
-        """Restores the traces from the output of `get_config`."""
-        return cls([(number, decay) for number, decay in config["chosen"]])
 
 
 def _trace(command: np.ndarray, decay: float) -> np.ndarray:

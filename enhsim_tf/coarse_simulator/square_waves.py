@@ -5,8 +5,7 @@
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -118,10 +117,6 @@ class SquareWaveSimulator:
         phase = np.mod(-begin - telemetry.offset_s / period_s, 1.0)  # relative to the zero of the series' time axis
         return cls([SquareWave(period_s, float(phase), duty, low, high)])
 
-    def get_config(self) -> dict:
-        """The settings as plain JSON types, from which `waves_or_level` restores the simulator."""
-        return {"waves": [dataclasses.asdict(wave) for wave in self.waves]}
-
 
 class ConstantLevel(SquareWaveSimulator):
     """A constant level for channels without a shape that repeats, in the form of a square wave whose two levels are equal.
@@ -146,21 +141,12 @@ class ConstantLevel(SquareWaveSimulator):
         if not (np.isfinite([level, spread]).all() and spread > 0):
             raise InputError(f"Expected a finite level and a spread above 0. Received: level={level}, spread={spread}.")
         super().__init__([SquareWave(period_s, low=float(level), high=float(level))])
-        self.level, self.spread = float(level), float(spread)
+        self.level, self.spread, self.period_s = float(level), float(spread), period_s
 
     @property
     def levels(self) -> tuple[float, float]:
         """Lowest and highest level for degraded modes and units."""
         return self.level - self.spread, self.level + self.spread
-
-    def get_config(self) -> dict:
-        """The settings as plain JSON types, from which `waves_or_level` restores the simulator."""
-        return {"level": self.level, "spread": self.spread, "period_s": self.waves[0].period_s}
-
-
-def waves_or_level(config: Mapping[str, Any]) -> SquareWaveSimulator:
-    """Restores a simulator from the output of `get_config`: a constant level, or square waves."""
-    return ConstantLevel(**config) if "level" in config else SquareWaveSimulator([SquareWave(**wave) for wave in config["waves"]])
 
 
 def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:

@@ -1,8 +1,7 @@
 """A fitted enhancer: maps coarse windows of all columns to telemetry windows of all channels, or a whole run (section 2.2, without TensorFlow)."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -52,37 +51,6 @@ class Enhancer:
                 if number < len(self.layers):
                     np.maximum(rows, 0, out=rows)
             flat += rows
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """All numbers by name, from which `from_arrays` builds the enhancer again."""
-        found = {"centre": self.centre, "bias": self.bias}
-        found |= {f"factor_{number}": each for number, each in enumerate(self.factors)}
-        for number, (kernel, bias) in enumerate(self.layers):
-            found |= {f"kernel_{number}": kernel, f"bias_{number}": bias}
-        return found | (dict(zip(("column", "gain"), self.main, strict=True)) if self.main else {})
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Name and sizes, in plain JSON types."""
-        return {name: getattr(self, name) for name in ("name", "window", "columns", "channels")}
-
-    @classmethod
-    def from_arrays(cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> "Enhancer":
-        """Builds an enhancer again from `settings` and `arrays`; raises ValueError, KeyError, IndexError or TypeError if they are of none."""
-        window, columns, channels = (int(settings[name]) for name in ("window", "columns", "channels"))
-        if not all(np.isfinite(each).all() for each in arrays.values()):
-            raise ValueError("an enhancer whose numbers are not finite")
-        known = {name: each.astype(np.float32) for name, each in arrays.items()}
-        factors = tuple(known[name] for name in ("factor_0", "factor_1") if name in known)
-        number = sum(name.startswith("kernel_") for name in known)
-        layers = tuple((known[f"kernel_{each}"], known[f"bias_{each}"]) for each in range(number))
-        main = (arrays["column"].astype(np.int64), known["gain"]) if "column" in arrays else None
-        if known["centre"].shape != (columns,) or known["bias"].shape != (window * channels,) or (main is not None and main[0].min() < 0):
-            raise ValueError("an enhancer whose arrays do not fit together")
-        made = cls(str(settings["name"]), window, columns, channels, known["centre"], known["bias"], factors, layers, main)
-        made.predict(np.zeros((1, window, columns)))  # fails if the other arrays do not fit together
-        return made
 
 
 def run_starts(num_samples: int, window: int, hop: int | None = None) -> np.ndarray:

@@ -78,11 +78,13 @@ class GaussianAutoregression(_Stationary):
         window: Number of samples in a window.
 
     Raises:
-        InputError: If the coefficients do not belong to a stationary process.
+        InputError: If the coefficients do not belong to a stationary process, or the standard deviation is negative.
     """
 
     def __init__(self, coefficients: Sequence[float], innovation_sd: float, window: int):
         self.coefficients, self.innovation_sd, self.window = np.asarray(coefficients, np.float64), float(innovation_sd), int(window)
+        if not self.innovation_sd >= 0:
+            raise InputError(f"Expected innovations with a standard deviation of 0 or more. Received: {self.innovation_sd}.")
         self._start = _lower_orders(self.coefficients, self.innovation_sd)
 
     @classmethod

@@ -2,16 +2,17 @@
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.degraded import Degraded, held_samples
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import pair_recordings
-from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, waves_or_level
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.joint import cut, long_enough, windows_of
 from enhsim_tf.telemetry.windows import num_window_starts
@@ -37,8 +38,6 @@ class Waves:
     waveform of a channel at every sample: `waveforms` has it at `_NUM_PHASES` phases, shape `(phases, samples)`, or None.
     """
 
-    kind = "waves"
-
     def __init__(
         self,
         simulators: Sequence[SquareWaveSimulator],
@@ -50,6 +49,9 @@ class Waves:
         self.simulators, self.channels = tuple(simulators), tuple(channels)
         self.interval_s, self.window = float(interval_s), int(window)
         self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
+        known = [each.shape for each in self.waveforms if each is not None]
+        if any(shape != (_NUM_PHASES, self.window) for shape in known):
+            raise InputError(f"Expected waveforms of shape {(_NUM_PHASES, self.window)}. Received: {known}. Learn them at all phases.")
         self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
@@ -170,28 +172,6 @@ class Waves:
         offset, scale = level_offset_and_scale(self.simulators[channel])
         return ((values - offset) / scale).astype(np.float32)
 
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """What is saved as arrays: the enhanced waveforms by name."""
-        return {f"waveform_{number}": each for number, each in enumerate(self.waveforms) if each is not None}
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All else, in plain JSON types."""
-        return {"kind": self.kind, "simulators": [each.get_config() for each in self.simulators]}
-
-    @classmethod
-    def from_arrays(
-        cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray], channels: Sequence[str], interval_s: float, window: int
-    ) -> "Waves":
-        """Builds the alignment again; raises ValueError if it is none."""
-        simulators = [waves_or_level(each) for each in settings["simulators"]]
-        waveforms = [arrays.get(f"waveform_{number}") for number in range(len(simulators))]
-        known = [each for each in waveforms if each is not None]
-        if len(simulators) != len(channels) or any(each.shape != (_NUM_PHASES, window) or not np.isfinite(each).all() for each in known):
-            raise ValueError("waves that do not fit to the channels, or are not finite")
-        return cls(simulators, channels, interval_s, window, waveforms)
-
 
 class Runs:
     """Runs of the user's simulator on the clock of the telemetry.
@@ -202,10 +182,8 @@ class Runs:
         delay_s: How much later the telemetry is than the coarse run, in seconds.
         coarse: The coarse simulator, or None if only a recorded run is known. Its code is not saved.
         name: Name of the coarse simulator.
-        commands: Settings of `CommandTraces`, if the run are commands of the telemetry's own file.
+        commands: The traces, if the run are commands of the telemetry's own file.
     """
-
-    kind = "runs"
 
     def __init__(
         self,
@@ -214,7 +192,7 @@ class Runs:
         delay_s: float = 0.0,
         coarse: CoarseSimulator | None = None,
         name: str = "",
-        commands: Mapping[str, Any] | None = None,
+        commands: CommandTraces | None = None,
     ):
         self.nominal, self.window, self.delay_s, self.coarse = nominal, int(window), float(delay_s), coarse
         self.name, self.commands = name or (name_of(coarse) if coarse is not None else nominal.name), commands
@@ -255,45 +233,6 @@ class Runs:
         run = self.usable(self.nominal)
         windows = windows_of(run, np.asarray(starts) % num_window_starts(run.parts, self.window), self.window)
         return Drawn(windows, windows)
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The parts of the nominal run by name."""
-        return arrays_of_recording(self.nominal)[0]
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All else, in plain JSON types."""
-        own = {"kind": self.kind, "delay_s": self.delay_s, "name": self.name, "commands": self.commands, "columns": list(self.columns)}
-        return own | arrays_of_recording(self.nominal)[1]
-
-    @classmethod
-    def from_arrays(
-        cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray], channels: Sequence[str], interval_s: float, window: int
-    ) -> "Runs":
-        """Builds the alignment again; raises ValueError if it is none."""
-        nominal = recording_of(arrays, settings, tuple(settings["columns"]), interval_s, str(settings["name"]))
-        if not np.isfinite([settings["delay_s"], *settings["offsets_s"]]).all() or any(
-            run.values.dtype != np.float32 for run in nominal.parts
-        ):
-            raise ValueError("a nominal run that is not finite, or of another type")
-        return cls(nominal, window, settings["delay_s"], None, nominal.name, settings["commands"])
-
-
-def arrays_of_recording(recording: Recording) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """What is saved of a recording: its parts as arrays by name, and its times in plain JSON types."""
-    arrays = {f"part_{number}": part.values for number, part in enumerate(recording.parts)}
-    return arrays, {"start": recording.start, "offsets_s": [part.offset_s for part in recording.parts]}
-
-
-def recording_of(
-    arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any], columns: tuple[str, ...], interval_s: float, name: str
-) -> Recording:
-    """Builds a recording again from what `arrays_of_recording` returns; raises ValueError if a value is not finite."""
-    parts = tuple(Run(arrays[f"part_{number}"], float(offset)) for number, offset in enumerate(settings["offsets_s"]))
-    if not all(np.isfinite(part.values).all() for part in parts):
-        raise ValueError("a recording that is not finite")
-    return Recording(parts, columns, interval_s, settings["start"], name)
 
 
 Alignment = Waves | Runs

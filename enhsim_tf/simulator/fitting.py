@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import Delay, estimate_delay, pair_recordings
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
@@ -113,7 +114,7 @@ def _fit_waves(
         traces = choices[0].traces
         if traces is not None:
             chosen = dataclasses.replace(options, window=choices[0].window, held_out=options.held_out if learnt is not recording else 0.0)
-            return _fit_runs(recording, traces.recording(commands), chosen, progress, said, traces.get_config())
+            return _fit_runs(recording, traces.recording(commands), chosen, progress, said, traces)
         window = max(each.window for each in choices)
         usable = long_enough(learnt, window)
         if usable is None or len(usable) < LEAST_LEARNT * window:
@@ -224,7 +225,7 @@ def _fit_runs(
     options: FitOptions,
     progress: Progress,
     said: str = "",
-    commands: Mapping[str, Any] | None = None,
+    commands: CommandTraces | None = None,
 ) -> tuple[EnhancedSimulator, Report]:
     run, notes = _run_of(coarse, recording)
     guess = options.window or default_window((1 - options.held_out) * len(recording))

@@ -1,7 +1,7 @@
 """Folders of fitted simulators: how they are named and found, and how a simulator is written to one and read again.
 
 A simulator is `arrays.npz`, `settings.json`, and `manifest.json` with the format and the checksums of both. Everything with more than a few
-numbers is an array. No code is saved.
+numbers is an array. No code is saved; see `packing`.
 """
 
 import os
@@ -23,7 +23,7 @@ _MOST_ARRAYS = 2**28  # maximum bytes of all arrays; the weights of the paper's 
 _MOST_NAME = 60  # bytes of the name of a folder
 _MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and locks add 50, and most file systems allow 255
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names of Windows
-_NUMBER = "3"  # of the format
+_NUMBER = "4"  # of the format
 _FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
 
 
@@ -100,13 +100,13 @@ def refuse_foreign(folder: str | os.PathLike) -> None:
         )
 
 
-def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> None:
-    """Writes a simulator to a folder atomically, in place of one that was there: its arrays by part and name, and settings in plain JSON types.
+def write_saved(folder: str | os.PathLike, arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any]) -> None:
+    """Writes a simulator to a folder atomically, in place of one that was there: its arrays by name, and settings in plain JSON types.
 
     Raises InputError if the folder contains something else, or if a number is not finite.
     """
     refuse_foreign(folder)
-    bad = [part for part, named in arrays.items() if not all(np.isfinite(each).all() for each in named.values())]
+    bad = sorted({name.partition("/")[0] for name, each in arrays.items() if not np.isfinite(each).all()})
     with replace_folder(folder) as temporary:
         try:
             write_json(temporary / _SETTINGS, settings)
@@ -116,7 +116,7 @@ def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.
             raise InputError(
                 f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. It was not saved. Fit it again."
             )
-        np.savez(temporary / _ARRAYS, **{f"{part}/{name}": each for part, named in arrays.items() for name, each in named.items()})
+        np.savez(temporary / _ARRAYS, **arrays)
         checksums = {name: sha256(temporary / name) for name in (_ARRAYS, _SETTINGS)}
         write_json(temporary / MANIFEST, {"format": _FAMILY + _NUMBER, "sha256": checksums})
 
@@ -157,16 +157,13 @@ def channels_of(folder: str | os.PathLike) -> tuple[str, ...]:
     return tuple(names)
 
 
-def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, Mapping[str, np.ndarray]], Mapping[str, Any]], Any]) -> Any:
-    """Loads a saved simulator, which `make` creates from the arrays of each part and the settings; raises InputError as `check_saved`."""
+def read_saved(folder: str | os.PathLike, make: Callable[[dict[str, np.ndarray], Mapping[str, Any]], Any]) -> Any:
+    """Loads a saved simulator, which `make` creates from its arrays and settings; raises InputError as `check_saved`."""
     folder = Path(folder)
     check_saved(folder)
     settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
     try:
-        arrays: dict[str, dict[str, np.ndarray]] = {}
-        for name, each in load_npz(folder / _ARRAYS, _MOST_ARRAYS).items():
-            part, _, rest = name.partition("/")
-            arrays.setdefault(part, {})[rest] = each
+        arrays = load_npz(folder / _ARRAYS, _MOST_ARRAYS)
         if sha256(folder / MANIFEST) != as_checked:  # another process replaced the model, so the settings may be those of the other
             raise ValueError("the simulator was replaced while it was read; try again")
         return make(arrays, settings)

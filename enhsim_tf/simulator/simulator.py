@@ -3,7 +3,6 @@
 It knows nothing of how it is fitted; see `fitting.fit`.
 """
 
-import dataclasses
 import functools
 import itertools
 import os
@@ -12,20 +11,23 @@ from typing import Any
 
 import numpy as np
 
+from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.recording import Recording, record
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
-from enhsim_tf.noise.candidates import NoiseModel, model_from, state_of
-from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs, Waves, arrays_of_recording, recording_of
+from enhsim_tf.noise.candidates import NoiseModel
+from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
 from enhsim_tf.simulator.joint import cut, rounded, windows_of
 from enhsim_tf.simulator.model_folder import read_saved, write_saved
+from enhsim_tf.simulator.packing import packed, unpacked
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 _CHUNK_VALUES = 2_000_000  # values that are generated at a time
+_SAVED = ("alignment", "enhancer", "noise", "channels", "interval_s", "levels", "quantisation", "nominal", "level_step")  # beside `trained`
 _NUM_NOISE = 256  # windows of generated noise from which its standard deviation is computed
 
 
@@ -368,25 +370,9 @@ class EnhancedSimulator:
         Raises:
             InputError: If the folder contains something else, or if a number is not finite; the folder is left unchanged.
         """
-        noise, noise_arrays = state_of(self.noise)
-        arrays = {"enhancer": self.enhancer.arrays, "noise": noise_arrays, "alignment": self.alignment.arrays}
-        settings = {
-            "alignment": self.alignment.settings,
-            "enhancer": self.enhancer.settings,
-            "noise": noise,
-            "window": self.window,
-            "channels": list(self.channels),
-            "interval_s": self.interval_s,
-            "level_step": self.level_step,
-            "quantisation": [None if each is None else dataclasses.asdict(each) for each in self.quantisation],
-            "nominal": None,
-            "trained": self.trained,
-        }
-        if self.levels is not None:
-            arrays["levels"] = {"rows": self.levels}
-        if self.nominal is not None:
-            arrays["nominal"], settings["nominal"] = arrays_of_recording(self.nominal)
-        write_saved(folder, arrays, settings)
+        arrays: dict[str, np.ndarray] = {}
+        settings = {name: packed(getattr(self, name), arrays, name) for name in _SAVED}
+        write_saved(folder, arrays, settings | {"trained": self.trained})
 
     @classmethod
     def load(cls, folder: str | os.PathLike, coarse: CoarseSimulator | None = None) -> "EnhancedSimulator":
@@ -411,29 +397,43 @@ class EnhancedSimulator:
         return simulator
 
     @classmethod
-    def _from_saved(cls, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> "EnhancedSimulator":
-        channels, interval_s, window = tuple(map(str, settings["channels"])), float(settings["interval_s"]), settings["window"]
-        level_step = float(settings["level_step"])
-        enhancer = Enhancer.from_arrays(settings["enhancer"], arrays["enhancer"])
-        kind = {"waves": Waves, "runs": Runs}[settings["alignment"]["kind"]]
-        alignment = kind.from_arrays(settings["alignment"], arrays.get("alignment", {}), channels, interval_s, window)
-        if enhancer.window != window or enhancer.channels != len(channels) or enhancer.columns != len(alignment.columns):
-            raise ValueError("an enhancer that does not fit to the settings")
-        if not all(np.isfinite(each) and each > 0 for each in (interval_s, level_step)):
-            raise ValueError("an interval that is not above 0")
-        levels, nominal = arrays.get("levels", {}).get("rows"), settings["nominal"]
-        if (levels is None) != (kind is Runs) or (levels is not None and not (np.isfinite(levels).all() and levels.size)):
-            raise ValueError("levels that do not fit to the alignment")
-        quantisation = [None if each is None else Levels(**each) for each in settings["quantisation"]]
-        known = [each for each in quantisation if each is not None]
-        if len(quantisation) != len(channels) or not all(np.isfinite([each.step, each.origin]).all() and each.step > 0 for each in known):
-            raise ValueError("quantisation of other channels, or without levels")
-        if nominal is not None:
-            nominal = recording_of(arrays["nominal"], nominal, channels, interval_s, ", ".join(channels))
-        noise, shape = model_from(settings["noise"], arrays["noise"]), (1, window, len(channels))
-        if noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
+    def _from_saved(cls, arrays: dict[str, np.ndarray], settings: Mapping[str, Any]) -> "EnhancedSimulator":
+        with np.errstate(all="ignore"):  # what is not finite is refused
+            parts = {name: unpacked(settings[name], arrays) for name in _SAVED}
+            if arrays:
+                raise ValueError(f"{len(arrays)} arrays of no part")
+            simulator = cls(**parts, trained=settings["trained"])
+            simulator._check_parts()
+        return simulator
+
+    def _check_parts(self) -> None:
+        """Raises ValueError, or another of `READ_ERRORS`, unless the parts of a loaded simulator are of the right kinds and fit together."""
+        alignment, enhancer, size = self.alignment, self.enhancer, len(self.channels)
+        clock = alignment.nominal if self.is_run_model else alignment
+        recordings = [each for each in (self.nominal, self.nominal_run) if each is not None]
+        runs = [run for each in recordings for run in each.parts]
+        fits = {
+            "channels": all(isinstance(name, str) for name in self.channels),
+            "interval": clock.interval_s == self.interval_s > 0 and self.level_step > 0,
+            "alignment": alignment.window == self.window and len(alignment.columns) == enhancer.columns,
+            "commands": not self.is_run_model or isinstance(alignment.commands, CommandTraces | None),
+            "enhancer": enhancer.channels == size and enhancer.bias.shape == (self.window * size,),
+            "noise": getattr(self.noise, "window", self.window) == self.window,
+            "levels": (self.levels is None) == self.is_run_model,
+            "quantisation": len(self.quantisation) == size,
+            "nominal": self.nominal is None or (self.nominal.columns, self.nominal.interval_s) == (self.channels, self.interval_s),
+            "parts": len({tuple(map(len, each.parts)) for each in recordings}) <= 1,
+            "start": all(isinstance(each.start, str | None) for each in recordings),
+            "runs": all(run.values.dtype == np.float32 and np.isfinite(run.offset_s) for run in runs),
+        }
+        if not all(fits.values()):
+            raise ValueError(f"parts that do not fit together: {', '.join(name for name, does in fits.items() if not does)}")
+        shape = (1, self.window, size)
+        if self.noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
             raise ValueError("noise of another shape")
-        return cls(alignment, enhancer, noise, channels, interval_s, levels, quantisation, nominal, settings["trained"], level_step)
+        window = self.generate(1)  # fails, as the residuals do, if a part is of another kind or an array of another shape
+        if not self.is_run_model:
+            self.residuals(window)
 
 
 def _changed_events(changed: np.ndarray, events: Sequence[tuple[Degraded, int, int]]) -> list[tuple[str, float, int, int]]:

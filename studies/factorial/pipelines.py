@@ -142,8 +142,9 @@ class Pipelines:
         depends = (self.settings.paper.of("windows"), self.settings.second)
         folder = self.stages.run("second network", self._train_second, depends, ("telemetry",), version=2)
         with np.load(folder / "enhancer.npz") as arrays:
-            sizes = {"name": NETWORK, "window": self.window, "columns": 1, "channels": 1}
-            enhancer = Enhancer.from_arrays(sizes, dict(arrays))
+            number = sum(name.startswith("kernel_") for name in arrays)
+            layers = tuple((arrays[f"kernel_{layer}"], arrays[f"bias_{layer}"]) for layer in range(number))
+            enhancer = Enhancer(NETWORK, self.window, 1, 1, arrays["centre"], arrays["bias"], layers=layers)
         return lambda coarse: enhancer.predict(coarse[:, :, None])[:, :, 0]
 
     def _train_second(self, folder: Path) -> None:
@@ -151,9 +152,11 @@ class Pipelines:
 
         self.stages.progress.step("enhancer network")
         starts = self.training_starts(MANY)
-        np.savez(
-            folder / "enhancer.npz", **fit_enhancer(NETWORK, *self.pairs(starts), starts, self.seed, self.settings.second.epochs).arrays
-        )
+        enhancer = fit_enhancer(NETWORK, *self.pairs(starts), starts, self.seed, self.settings.second.epochs)
+        arrays = {"centre": enhancer.centre, "bias": enhancer.bias}
+        for layer, (kernel, bias) in enumerate(enhancer.layers):
+            arrays |= {f"kernel_{layer}": kernel, f"bias_{layer}": bias}
+        np.savez(folder / "enhancer.npz", **arrays)
 
     def _extracted(self, windows: str, extraction: str, enhancer: str) -> np.ndarray:
         """Windows of the noise that a generator learns, of shape `(windows, samples)`; the arguments are `Cell.source`."""

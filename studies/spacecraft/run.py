@@ -1,6 +1,7 @@
 """The cells of the study, one for each channel and seed, and the tables that they fill."""
 
 import argparse
+import functools
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -67,10 +68,10 @@ def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stag
     name = channel.name
     checksums = [zlib.crc32(np.ascontiguousarray(part.values)) for part in (channel.train, channel.test)]
     depends = (checksums, settings.spacecraft, settings.seed)
-    fits = {
-        enhancer: stages.run(f"fit {name} {enhancer}", lambda folder, each=enhancer: _fit(folder, channel, each, settings, stages), depends)
-        for enhancer in ENHANCERS
-    }
+    fits = {}
+    for enhancer in ENHANCERS:
+        fit = functools.partial(_fit, channel=channel, enhancer=enhancer, settings=settings, stages=stages)
+        fits[enhancer] = stages.run(f"fit {name} {enhancer}", fit, depends, version=2)
 
     def judge(folder: Path) -> None:
         from enhsim_tf.simulator.simulator import EnhancedSimulator

@@ -1,12 +1,10 @@
 """Tests of the coarse simulator, its fit to known waves, and its degraded modes in closed form."""
 
-import json
-
 import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, fit_box, level_offset_and_scale, waves_or_level
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, fit_box, level_offset_and_scale
 from enhsim_tf.telemetry.series import Telemetry
 
 TWO = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)])
@@ -43,7 +41,6 @@ def test_simulator_is_the_sum_of_its_waves(refused):
     first, second = TWO.waves
     assert (TWO(TIMES) == first(TIMES) + second(TIMES)).all()
     assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(TIMES).dtype == np.float32
-    assert waves_or_level(json.loads(json.dumps(TWO.get_config()))).waves == TWO.waves
     assert TWO.levels == (0.5, 2.0) and TWO.shortest_period_s == 120
     assert level_offset_and_scale(TWO) == (1.25, 0.75)
     with refused("waves=[]"):

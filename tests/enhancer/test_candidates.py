@@ -85,16 +85,6 @@ def test_the_papers_network_takes_all_columns_and_learns():
     assert (errors < 0.4 * targets.std(axis=(0, 1))).all()  # of the first channel, one coarse column alone leaves 0.7
 
 
-@pytest.mark.parametrize("name", [COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_FEATURES])
-def test_an_enhancer_of_arrays_is_the_same(name):
-    coarse = series(800)
-    inputs, targets, starts = windows_of(coarse, coarse**2, 60)
-    found = fit_enhancer(name, inputs, targets, starts)
-    again = Enhancer.from_arrays(found.settings, found.arrays)
-    assert again.name == name and again.settings == found.settings
-    np.testing.assert_array_equal(again.predict(inputs), found.predict(inputs))
-
-
 def test_random_features_are_ridge_regression_on_a_hidden_layer_of_relu():
     coarse = series(800)
     inputs, targets, starts = windows_of(coarse, np.stack([coarse[:, 0] ** 2, 4 * np.abs(coarse[:, 1])], axis=1), 60)

@@ -94,5 +94,7 @@ def test_autoregressions_that_are_refused(refused):
         GaussianAutoregression([1.2], 0.1, 50)
     with refused("stationary"):
         GaussianAutoregression([0.5, 0.5], 0.1, 50)  # a root on the unit circle
+    with refused("0 or more", "-1.0"):
+        GaussianAutoregression([0.5], -1.0, 9)
     with refused("noise that varies"):
         GaussianAutoregression.fit(np.ones((5, 30)), 4)

@@ -113,10 +113,7 @@ def test_windows_of_a_run_begin_again_after_the_last():
     np.testing.assert_array_equal(drawn.coarse, [values[:80], values[20:], values[:80], values[1:81]])
 
 
-@pytest.mark.parametrize(
-    ("settings", "arrays"), [({"delay_s": np.nan}, {}), ({"offsets_s": [np.inf]}, {}), ({}, {"part_0": np.zeros((100, 2))})]
-)
-def test_a_saved_run_that_is_not_finite_is_none(settings, arrays):
-    runs = Runs(coarse_run(100), 80, 20.0, name="the box")
-    with pytest.raises(ValueError, match="not finite, or of another type"):
-        Runs.from_arrays(runs.settings | settings, runs.arrays | arrays, ("a",), 10.0, 80)
+def test_waveforms_have_every_phase_of_a_window(refused):
+    simulator = SquareWaveSimulator([SquareWave(40.0)])
+    with refused("(400, 80)", "(399, 80)"):
+        Waves([simulator], ("a",), 1.0, 80, [np.zeros((399, 80))])
