@@ -119,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
 
     # the seconds of TensorFlow begin here, after all cheap checks
     from enhsim_tf.paper.claims import judge_all, outside, title
-    from enhsim_tf.paper.figures import FIGURES, save_figure
+    from enhsim_tf.paper.figures import FIGURES, TRAINED, save_figure
     from enhsim_tf.paper.pipeline import Pipeline
     from enhsim_tf.paper.report import as_text, read_published, results, write_page
 
@@ -130,8 +130,8 @@ def run(options: argparse.Namespace) -> int:
         from enhsim_tf.own_channel import OwnChannel
 
         pipeline = OwnChannel(settings, stages, store, options.telemetry, options.column, options.time)
-    for name in FIGURES:
-        if options.only in (None, name.split("_")[0]):
+    for name in sorted(FIGURES, key=lambda name: name[:5] in TRAINED):
+        if options.only in (None, name[:5]):
             save_figure(name, pipeline, folder, foot_of(options, name), options.budget == "smoke")
     if options.only:
         return 0

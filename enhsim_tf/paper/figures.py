@@ -48,6 +48,8 @@ FACTS = {"time_unit": "min", "unit": "dimensionless"}  # of all axes that show w
 
 FIGURES: dict[str, Figure] = {}
 """All figures by name, in the order of their numbers."""
+TRAINED = ("fig04", "fig05", "fig06", "fig07", "fig12", "fig13")
+"""Those that show a trained network, which a run draws last."""
 Draw = Callable[[Pipeline], matplotlib.figure.Figure | None]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from enhsim_tf import reproduce
 from enhsim_tf.paper.claims import CLAIMS, NOT_MEASURED, judge_all
-from enhsim_tf.paper.figures import FIGURES
+from enhsim_tf.paper.figures import FIGURES, TRAINED, save_figure
 from enhsim_tf.paper.telemetry import ParquetStore
 from tests.paper.conftest import TINY_OPTIONS, tiny_pipeline
 
@@ -35,6 +35,14 @@ def test_every_figure_is_written_and_the_page_shows_it(ran):
         assert (out / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
         assert f'id="{name}"' in page and (out / f"{name}.svg").stat().st_size > 1_000
     assert not re.search(r"<script|https?://(?!arxiv\.org)[^\"]*\"", re.sub(r'src="data:[^"]*"', "", page))
+
+
+def test_figures_that_a_run_draws_first_need_no_trained_network(tmp_path):
+    pipeline = tiny_pipeline(tmp_path)
+    for name in FIGURES:
+        if name[:5] not in TRAINED:
+            save_figure(name, pipeline, tmp_path, "")
+    assert set(pipeline.stages.cached) <= {"telemetry"}
 
 
 @pytest.mark.parametrize(
