@@ -8,15 +8,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.paper import degraded
-
-MODES = {
-    "stuck": "the mechanism stands still from the onset, for the fraction `severity` of the remaining time",
-    "drift": "adds a ramp that reaches `severity` times the difference between highest and lowest level at the end",
-    "gain_loss": "the amplitude around the middle level is multiplied by 1 - `severity`",
-    "friction": "motion is delayed by a random lag of up to `severity` times a quarter of the shortest period",
-    "dropout": "random runs of 10 samples, half of all runs at severity 1, read the lowest level",
-    "period_change": "every period is multiplied by 1 + `severity`",
-}
+from enhsim_tf.paper.degraded import MODES
 
 
 @dataclasses.dataclass(frozen=True)

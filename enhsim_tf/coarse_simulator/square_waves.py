@@ -22,15 +22,12 @@ _OVERSAMPLING = 4  # frequency oversampling of the periodogram
 class SquareWave:
     """One square wave: `high` for the fraction `duty` of each period, `low` for the rest.
 
-    With more than two levels, the wave is a quantised sine of the same period, phase and duty.
-
     Args:
         period_s: Period in seconds.
         phase: Phase at time 0 as a fraction of a period, from 0 to 1.
         duty: Fraction of each period spent above the middle level, between 0 and 1.
         low: Lowest level, in the telemetry's unit.
         high: Highest level, in the telemetry's unit.
-        num_levels: Number of levels, at least 2.
 
     Raises:
         InputError: If an argument is out of range.
@@ -41,24 +38,17 @@ class SquareWave:
     duty: float = 0.5
     low: float = -1.0
     high: float = 1.0
-    num_levels: int = 2
 
     def __post_init__(self):
-        numbers = (self.period_s, self.phase, self.duty, self.low, self.high, self.num_levels)
-        if not np.isfinite(numbers).all() or self.period_s <= 0 or not 0 < self.duty < 1 or self.num_levels < 2:
-            raise InputError(f"Expected period_s > 0, 0 < duty < 1, num_levels >= 2 and finite numbers. Received: {self}.")
+        numbers = (self.period_s, self.phase, self.duty, self.low, self.high)
+        if not np.isfinite(numbers).all() or self.period_s <= 0 or not 0 < self.duty < 1:
+            raise InputError(f"Expected period_s > 0, 0 < duty < 1 and finite numbers. Received: {self}.")
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """Evaluates the wave at times in seconds; returns a float64 array of the same shape."""
         cycle = np.asarray(time_s, np.float64) / self.period_s + self.phase
         cycle -= np.floor(cycle)  # the same as a modulus, in a fraction of the time
-        above = cycle < self.duty
-        if self.num_levels == 2:
-            return np.where(above, float(self.low + (self.high - self.low)), float(self.low))
-        half_wave = np.where(above, np.sin(np.pi * cycle / self.duty), -np.sin(np.pi * (cycle - self.duty) / (1 - self.duty)))
-        step = np.floor(self.num_levels * (half_wave + 1) / 2)
-        share = np.minimum(step, self.num_levels - 1) / (self.num_levels - 1)
-        return self.low + (self.high - self.low) * share
+        return np.where(cycle < self.duty, float(self.low + (self.high - self.low)), float(self.low))
 
 
 class SquareWaveSimulator:

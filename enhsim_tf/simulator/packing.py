@@ -17,7 +17,7 @@ from enhsim_tf.telemetry.quantisation import Levels
 _ARGUMENTS = {
     Waves: ("simulators", "channels", "interval_s", "window", "waveforms"),
     SquareWaveSimulator: ("waves",),
-    SquareWave: ("period_s", "phase", "duty", "low", "high", "num_levels"),
+    SquareWave: ("period_s", "phase", "duty", "low", "high"),
     ConstantLevel: ("level", "spread", "period_s"),
     Runs: ("nominal", "window", "delay_s", "name", "commands"),
     CommandTraces: ("chosen",),

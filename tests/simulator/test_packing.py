@@ -46,7 +46,7 @@ def test_a_saved_enhancer_predicts_the_same(name):
     np.testing.assert_array_equal(made.predict(CLEAN), enhancer.predict(CLEAN))
 
 
-@pytest.mark.parametrize("part", [SquareWaveSimulator([SquareWave(9.0, 0.1, 0.3, -2.0, 3.0, 4)] * 2), ConstantLevel(2.0, 0.5, 7.0)])
+@pytest.mark.parametrize("part", [SquareWaveSimulator([SquareWave(9.0, 0.1, 0.3, -2.0, 3.0)] * 2), ConstantLevel(2.0, 0.5, 7.0)])
 def test_saved_waves_and_levels_are_the_same(part):
     times = np.arange(30.0)[None]
     made = again(Waves([part], ["a"], 2.0, 40, [None]))
