@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 
 STYLE = ("default", Path(__file__).with_name("style.mplstyle"))  # for `matplotlib.style.context`
 REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
+RESIDUALS, RIDGE, LEARNT = "#009e73", "#56b4e9", "#cc79a7"  # residual windows, ridge regression, other learnt noise
 QUIET, LINE = "#595959", "#8c8c8c"  # secondary text; outlines
 IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker colours for text that names a curve
 DASHED = (0, (4, 2))  # line style of the second curve of a panel

@@ -27,7 +27,7 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.5,
-        "Fault windows found: the simulator as reference and as source",
+        "The enhanced run finds most faults, trained detectors few",
         "Share of windows with an alarm, at thresholds that are set for 1 % false alarms. Means over seeds and detectors; severity 1 is the largest.",
     )
     grid = panels(figure, down + 0.55, len(regimes), len(kinds), gap=(0.2, 0.12), sharex=True, sharey=True)

@@ -8,14 +8,14 @@ import matplotlib.ticker
 from matplotlib.axes import Axes
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, FOOT, QUIET, REAL, new_sheet, panels
+from enhsim_tf.common.plot_style import AVERAGE, DOUBLE, FOOT, QUIET, REAL, RESIDUALS, new_sheet, panels
 from studies.few_windows import record
 
 _CURVES = {  # label, marker, line style and colour of each curve that is drawn
     record.REAL: ("the real windows alone", "|", "-", REAL),
     record.SIMULATOR + "autoregression": ("simulator + autoregression", "^", "--", AVERAGE),
-    record.SIMULATOR + "residual windows": ("simulator + residual windows", "D", "-", ENHANCED),
-    record.CORAL: ("CORAL", "s", ":", COARSE),
+    record.SIMULATOR + "residual windows": ("simulator + residual windows", "D", "-", RESIDUALS),
+    record.CORAL: ("CORAL", "s", ":", QUIET),
 }
 
 
@@ -25,7 +25,7 @@ def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.6,
-        "A simulator with a simple noise model pays where windows are few",
+        "With at most 20 windows, a simulator pays if its noise fits",
         "Detectors trained on k real windows, or on a simulator fitted to the same k windows. Mean over four detectors and the seeds. Above: "
         "nominal windows that are flagged; the line is the target of 1 %; the scale is linear below it. Below: anomalies of 4 standard deviations "
         "found at 1 % false alarms.",

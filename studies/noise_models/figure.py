@@ -7,13 +7,13 @@ import matplotlib.figure
 import numpy as np
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, QUIET, REAL, new_sheet, panels
+from enhsim_tf.common.plot_style import AVERAGE, DOUBLE, LEARNT, QUIET, REAL, RESIDUALS, new_sheet, panels
 
 _MARKS = {  # marker, colour and face of each model that is shown
     "real": ("|", REAL, REAL),
     "autoregression": ("^", AVERAGE, "none"),
-    "matched residual windows": ("s", COARSE, "none"),
-    "mixture density network": ("o", ENHANCED, ENHANCED),
+    "matched residual windows": ("s", RESIDUALS, "none"),
+    "mixture density network": ("o", LEARNT, LEARNT),
 }
 
 
@@ -23,7 +23,7 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         max(2.6, 1.5 + 0.22 * len(families)),
-        "Matched residual windows stay near real windows on all families",
+        "Matched residual windows keep false alarms near 1 % on all families",
         "Detectors trained with noise of each model, judged on real windows; means of seven. Lines: the target of 1 % and the tolerance of 3 points. "
         "Above the dots: families that the design of the network looked at.",
     )

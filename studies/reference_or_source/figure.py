@@ -38,9 +38,9 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         2.35 * len(systems) + 0.6,
-        "A simulator finds faults as a reference, hardly as a source",
+        "A reference finds more faults than a source, if physics is near",
         "Fault windows found, at thresholds set for 1 % false alarms on the known telemetry. Open marks: more than 3 % false alarms. "
-        "Bands: 95 % intervals over seeds and faults.",
+        "Bars: 95 % intervals over seeds and faults, at one point.",
     )
     grid = panels(figure, down + 0.45, len(systems), 3, gap=(0.62, 0.12), sharey=True)
     for row, (name, about) in zip(np.reshape(grid, (len(systems), 3)), systems.items(), strict=True):
@@ -57,17 +57,22 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
             _curve(row[0], np.array([point["units"] for point in crude]), crude, use, label, style)
             for axes, there in ((row[1], by_simulator), (row[2], commands)):
                 _curve(axes, np.arange(len(there)), here * len(there) if use == NO_SIMULATOR else there, use, label, style)
+        for place, (use, (_, style)) in enumerate(SHOWN.items()):
+            recall = here[0]["uses"][use]["recall"]
+            at = middle * 1.1 ** (place - 1.5)
+            row[0].plot([at, at], [100 * recall["low"], 100 * recall["high"]], color=style["color"], linewidth=1.2, alpha=0.6)
         row[0].set_xscale("log")
-        row[0].set_xticks([point["units"] for point in crude], [f"{point['units']}" for point in crude])
+        windows = 5 if name == "battery" else 10  # of an orbit, of a flight
+        row[0].set_xticks([point["units"] for point in crude], [f"{windows * point['units']:,}" for point in crude])
         row[0].minorticks_off()
-        row[1].set_xticks(np.arange(len(by_simulator)), [_SIMULATORS[point["simulator"]] for point in by_simulator], fontsize=5.5)
-        row[2].set_xticks(np.arange(len(commands)), [_COMMANDS[point["level"]] for point in commands], fontsize=5.5)
+        row[1].set_xticks(np.arange(len(by_simulator)), [_SIMULATORS[point["simulator"]] for point in by_simulator], fontsize=6)
+        row[2].set_xticks(np.arange(len(commands)), [_COMMANDS[point["level"]] for point in commands], fontsize=6)
         for axes, there in ((row[1], by_simulator), (row[2], commands)):
             axes.set_xlim(-0.45, len(there) - 0.55)
         row[0].set_xlim(crude[0]["units"] / 1.4, crude[-1]["units"] * 1.4)
         row[0].set_ylabel(f"{name}: found (%)")
         row[0].set_ylim(-4, 104)
-        for axes, label in zip(row, ("known orbits" if name == "battery" else "known flights", "simulator", "commands"), strict=True):
+        for axes, label in zip(row, ("known windows", "simulator", "commands"), strict=True):
             axes.set_xlabel(label)
     handles, labels = np.ravel(grid)[0].get_legend_handles_labels()
     above = 1 - down / figure.get_size_inches()[1]
@@ -76,15 +81,12 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
 
 
 def _curve(axes: matplotlib.axes.Axes, at: np.ndarray, points: list, use: str, label: str, style: Mapping[str, Any]) -> None:
-    """Draws the recall of a use with its band, and open marks where false alarms are too many."""
+    """Draws the recall of a use, with open marks where false alarms are too many."""
     uses = [point["uses"][use] for point in points]
-    values = {name: np.array([100 * each["recall"][name] for each in uses]) for name in ("mean", "low", "high")}
+    found = np.array([100 * each["recall"]["mean"] for each in uses])
     is_broken = np.array([each["false_alarms"]["mean"] > _BROKEN for each in uses])
-    axes.plot(at, values["mean"], linewidth=1.2, markersize=3.5, label=label, **style)
-    axes.plot(
-        at[is_broken], values["mean"][is_broken], style["marker"], color=style["color"], markerfacecolor="white", markersize=3.5, zorder=3
-    )
-    axes.fill_between(at, values["low"], values["high"], color=style["color"], alpha=0.12, linewidth=0)
+    axes.plot(at, found, linewidth=1.2, markersize=3.5, label=label, **style)
+    axes.plot(at[is_broken], found[is_broken], style["marker"], color=style["color"], markerfacecolor="white", markersize=3.5, zorder=3)
 
 
 FIGURES = {

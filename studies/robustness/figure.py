@@ -8,16 +8,29 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, GREY_TINT, QUIET, REAL, label_ends, new_sheet, panels
+from enhsim_tf.common.plot_style import (
+    COARSE,
+    DOUBLE,
+    ENHANCED,
+    GENERATED,
+    GREY_TINT,
+    QUIET,
+    REAL,
+    RESIDUALS,
+    RIDGE,
+    label_ends,
+    new_sheet,
+    panels,
+)
 from studies.robustness.degraded_modes import LARGEST_TRAINED
 
 Findings = Mapping[str, Any]
 _ROWS = {  # colour and marker of each arm
     "coarse": (COARSE, "s"),
     "truth": (COARSE, "s"),
-    "enhanced": (GENERATED, "D"),
+    "enhanced": (ENHANCED, "D"),
     "enhanced + GAN": (GENERATED, "D"),
-    "ridge + residual windows": (ENHANCED, "o"),
+    "ridge + residual windows": (RESIDUALS, "o"),
     "real": (REAL, "o"),
 }
 _LEAST = 2e-4  # smaller rates are drawn here, because the axis is logarithmic
@@ -29,8 +42,8 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
         DOUBLE,
         1.3 + 1.7 * -(-len(found["environments"]) // 2),
         "Of simulated training data, only residual windows keep false alarms low",
-        "False alarms on real nominal windows. Simulators without noise (grey), the paper's pipeline (orange), ridge and residual windows (blue), "
-        "real telemetry (black). Large mark, bar: mean of seven detectors, 95 % interval. Small marks: detectors, at least 0.02 %.",
+        "False alarms on real nominal windows. Signals without noise (grey, blue), with the paper's GAN (orange), with residual windows (green), "
+        "real telemetry (black). Large mark, bar: mean of seven detectors, 95 % interval. Small marks: each detector.",
     )
     environments = found["environments"]
     columns = min(2, len(environments))
@@ -65,7 +78,7 @@ def _row(axes: Axes, height: float, about: Mapping[str, Any], colour: str, marke
 _METHODS = {
     "coarse": (COARSE, "-.", "coarse"),
     "paper": (GENERATED, "--", "paper's network"),
-    "ridge, faults": (REAL, ":", "ridge on faults"),
+    "ridge, faults": (RIDGE, ":", "ridge on faults"),
     "random features, faults": (ENHANCED, "-", "features on faults"),
 }
 
@@ -75,7 +88,7 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        "Enhancers follow faults only if they have learnt from faults",
+        "Enhancers follow five of six faults only after learning faults",
         "Root-mean-square error with respect to the true degraded signal, in standard deviations of the nominal signal; means over seeds. "
         "“On faults”: trained on random configurations of all modes, with severities in the grey area.",
     )

@@ -7,7 +7,7 @@ import matplotlib.figure
 import numpy as np
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, SINGLE, new_sheet, panels
+from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, RIDGE, SINGLE, new_sheet, panels
 
 Findings = Mapping[str, Any]
 GROUPS = {"references": (ENHANCED, "s"), "controls": (QUIET, "D"), "sources": (GENERATED, "o")}
@@ -54,7 +54,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
         "Spacecraft channels: median error of nominal test windows, aligned in phase, offset and gain.",
     )
     axes = panels(figure, down + 0.3, 1, 1)[0, 0]
-    marks = (("coarse", "s", COARSE, 0.0), ("enhanced", "o", ENHANCED, 0.12), ("ridge", "^", AVERAGE, -0.12))
+    marks = (("coarse", "s", COARSE, 0.0), ("enhanced", "o", ENHANCED, 0.12), ("ridge", "^", RIDGE, -0.12))
     for method, mark, colour, beside in marks:
         values = [about["nrmse"][method] for about in channels.values()]
         axes.plot(values, beside - np.arange(len(values)), mark, color=colour, markersize=5, label=method)
