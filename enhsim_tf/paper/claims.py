@@ -92,10 +92,10 @@ class Claim:
     margin: float = 0.5
 
 
-def kept(stage: str, *networks: str) -> Callable[[Measure], Measure]:
+def kept(stage: str, *networks: str, version: int = 1) -> Callable[[Measure], Measure]:
     """Keeps what a function measures as a stage, after its networks: `enhancer`, `noise GAN` or both.
 
-    Name the stage otherwise when changed code measures something else; the cache then measures it again.
+    Raise the version when changed code measures something else; the cache then measures it again.
     """
 
     def keep(measure: Measure) -> Measure:
@@ -105,7 +105,7 @@ def kept(stage: str, *networks: str) -> Callable[[Measure], Measure]:
                 for network in networks:
                     _ = pipeline.enhancer_folder if network == "enhancer" else pipeline.gan_folder
                 depends, after = pipeline.settings.of("windows", "noise", "claims"), ["telemetry", *networks]
-                folder = pipeline.stages.run(stage, lambda folder: save_arrays(folder, measure(pipeline)), depends, after)
+                folder = pipeline.stages.run(stage, lambda folder: save_arrays(folder, measure(pipeline)), depends, after, version)
                 pipeline.measured[stage] = {name: float(value) for name, value in load_arrays(folder).items()}
             return pipeline.measured[stage]
 
