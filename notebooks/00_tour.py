@@ -75,7 +75,7 @@ assert len(levels) == 4
 # ## Steps 3 and 5: the enhancer
 #
 # Network one maps 500 coarse samples to 500 smooth ones: four Dense layers, trained by mean squared error. The target is noisy, but noise
-# cannot be predicted from a square wave, so least squares averages it away ([03](03_enhancer.ipynb)).
+# cannot be predicted from a square wave, so least squares averages most of it away ([03](03_enhancer.ipynb)).
 
 # %%
 show(pipeline, "fig04_enhanced_simulation")
@@ -99,7 +99,7 @@ assert after < bound[budget]
 assert rough > 2 * smooth
 
 # %% [markdown]
-# A matrix does better. (Notebook 04 tries other penalties: 0.031.)
+# A matrix does better.
 #
 # ## Step 6: the noise
 #
@@ -129,7 +129,7 @@ num_records = pipeline.settings.iterations // pipeline.settings.record_every
 history = {key: values[:num_records] for key, values in pipeline.history.items() if values.ndim}
 
 # %% [markdown]
-# *What to see:* the two accuracies swing in opposite directions. After the first record the losses
+# *What to see:* the two accuracies swing in opposite directions. After the first record (one every 100 iterations) the losses
 # ([binary cross-entropy](../docs/glossary.md#adversarial-loss)) stay near ln 2, which guessing gives, and the discriminator is right about
 # half of the time. Here the paper stops: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
 
@@ -278,7 +278,7 @@ assert budget == "smoke" or decides == "lag_one_error"
 # |---|---|
 # | enhancer | one matrix does better; most faults have more than twice the nominal error (C9) |
 # | moving average | a little of the waveform stays in the noise (notebook 08) |
-# | noise GAN | neighbouring samples are correlated too strongly (C6); few dimensions, although the networks are in balance |
+# | noise GAN | the correlation of neighbouring samples misses its limit (C6); few dimensions, although the networks are in balance |
 # | sum | the PCA residual and the autoencoder alarm on nominal telemetry (C8) |
 #
 # **Answer.** Not as it stands: the signal is nearly right, but two of three detectors alarm far too often on nominal telemetry.

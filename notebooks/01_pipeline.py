@@ -4,7 +4,7 @@
 # **Question:** how do a crude simulator and two networks make telemetry?
 #
 # - **After this lesson** you can name the nine steps of the paper, and compute a window of telemetry step by step.
-# - **You should know** nothing in particular; every step has a lesson of its own.
+# - **You should know** NumPy, and what a trained Keras model is; every step has a lesson of its own.
 # - **Terms:** *telemetry*: the measurements that a vehicle sends. *Window*: here 500 samples in a row. *Coarse simulator*: a simple model,
 #   here a sum of square waves. *Enhancer*: the network that turns square waves into a waveform. *Generator*: the network that turns random
 #   numbers, the *latent vector*, into noise. *GAN*: the generator together with the network that trains it. *Moving average*: the mean of
@@ -32,7 +32,7 @@ show(pipeline, "fig01_pipeline")
 #
 # Both networks are plain Keras models. They learn from telemetry of a vehicle or a fine simulator (step 4): the enhancer from the
 # telemetry, the generator from the noise that is left when a moving average is subtracted (step 6). The example is a satellite with an
-# orbit of 480 s and a rotation of 120 s, whose amplitudes are 0.5 and 0.25. A window needs seven lines:
+# orbit of 480 s and a rotation of 120 s, whose amplitudes are 0.5 and 0.25. Nine lines make four windows:
 
 # %%
 enhancer, generator = pipeline.enhancer, pipeline.generator
@@ -86,8 +86,8 @@ say(
 assert difference < 1e-5
 
 # %% [markdown]
-# The paper promises speed (C2). The limits are about time; nobody measured memory. Two of them compare with simulators of a
-# [battery](../studies/battery/README.md).
+# The paper promises speed (C2). The limits are about time; nobody measured memory, so *reproduced* covers speed only. Two of them compare
+# with simulators of a [battery](../studies/battery/README.md).
 
 # %%
 claim("C2")
@@ -178,9 +178,9 @@ check_answer(
 # correlation = 0
 # ```
 #
-# The noise is drawn independently of the waveform, so the pipeline takes for granted that noise does not depend on the signal. It has the
-# same size everywhere, the average over all levels of the signal: too large where the signal is small, too small
-# where it is large. The arrow that is missing in the figure leads from *clean data* (5) into the GAN (8): a generator that is given the
-# signal as a condition.
+# The noise is drawn independently of the waveform, so the pipeline takes for granted that noise does not depend on the signal. Its size
+# does not depend on the level of the signal: where real noise grows with the signal, it is too large at small levels and too small at large
+# ones. The arrow that is missing in the figure leads from *clean data* (5) into the GAN (8): a generator that is given the signal as a
+# condition.
 #
 # </details>

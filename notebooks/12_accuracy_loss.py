@@ -96,7 +96,7 @@ say(
 assert budget == "smoke" or np.ptp(of_real) > 4 * error
 
 # %% [markdown]
-# So most of the swings are not chance: the discriminator changes its mind from record to record.
+# So most of the swings are not chance: the discriminator changes its mind several times.
 
 # %% [markdown]
 # ## What the figure does not show
@@ -163,9 +163,9 @@ _ = verdict(pipeline, "C4", "C5")
 # %% [markdown]
 # In this run, the two stay balanced (C5), but the noise settles later than its limit (C4).
 #
-# **Answer.** Little. Accuracy and loss show that *this* discriminator is right no more often than a coin (after 1,000 iterations, its AUC
-# is 0.49, too: notebook 10). The noise's own curves show when it settles. None shows how few dimensions it fills: its effective rank is
-# less than a tenth of the real one.
+# **Answer.** Little. Accuracy and loss show that *this* discriminator is right no more often than a coin in the second half of training.
+# The noise's own curves show more: its standard deviation settles early, its lag-1 correlation hardly at all. None shows how few dimensions
+# it fills: its effective rank is less than a tenth of the real one.
 #
 # ## Exercises
 #

@@ -146,8 +146,8 @@ with drawing(alt, height=2.1, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the threshold from the training windows is useless. The twenty components describe a part of the noise of these very
-# windows, and of no others. Cross-fitting comes much nearer to the 1 % that was asked for, but with five and with twenty windows it is
+# *What to see:* the threshold from the training windows is useless. Probably, the twenty components describe a part of the noise of these
+# very windows, and of no others. Cross-fitting comes much nearer to the 1 % that was asked for, but with five and with twenty windows it is
 # still above it.
 
 # %%
@@ -300,9 +300,9 @@ with drawing(alt, len(environments), 2.6, title, sharex=True, sharey=True) as pa
 
 # %% [markdown]
 # *What to see:* where the noise model describes the noise, the simulator stays within half a point (dashed) from five windows on, and the
-# real windows from 50 on. Where it does not, no number of windows brings it down. With autoregressive noise, the simulator pays in the
-# study, whose numbers are means over four detectors. It did not for the one detector above: with 5 and 20 windows it lost more than 3
-# points of recall (with 20, by less than the standard error), and with 100 the real windows suffice.
+# real windows from 50 on. Where it does not, with these two noise models no number of windows brings it down. With autoregressive noise,
+# the simulator pays in the study, whose numbers are means over four detectors. It did not for the one detector above: with 5 and 20 windows
+# it lost more than 3 points of recall (with 20, by less than the standard error), and with 100 the real windows suffice.
 
 # %%
 print("numbers of windows in the study:", numbers)
@@ -402,7 +402,7 @@ check_answer(
 #     print(f"{environment}, excess at most {limit:.1%}: from {suffices_from(environment, limit)}")
 # ```
 #
-# Where the answer jumps with a small change of the tolerance, the curve is flat or noisy there: on heteroscedastic noise, 300 windows miss
-# the half point by very little.
+# Where the answer jumps with a small change of the tolerance, a value lies close to the tolerance: on heteroscedastic noise, 300 windows
+# miss the half point by very little.
 #
 # </details>

@@ -165,9 +165,9 @@ with drawing(alt, height=2.2, title=title) as panel:
 # %% [markdown]
 # *What to see:* as a reference, the simulator finds most of the fault; as a source, it finds as little as no simulator does, and flags as
 # many nominal windows. With as many finds as false alarms, these two are no better than chance. A detector that looks at a window alone
-# must accept every voltage that some nominal window has. The reference is told what was commanded; the current alone does not say which
-# voltage follows. No use keeps to the 1 % that its threshold was set for. (Notebook 27 has another detector on the same run; its shares are
-# of other windows.)
+# must accept every voltage that some nominal window has. The reference knows the simulated voltage of this time; the current alone does not
+# say which voltage follows. No use keeps to the 1 % that its threshold was set for. (Notebook 27 has another detector on the same run; its
+# shares are of other windows.)
 
 # %%
 print(pd.DataFrame(results).T.round(3).to_string())
@@ -179,8 +179,8 @@ assert results["reference, enhanced run"]["found"] > 3 * results["reference, cur
 # ## What the study found
 #
 # The [study](../studies/reference_or_source/README.md) has two systems, eleven kinds of faults, and one detector for all uses (the distance
-# of the channels' means). Here are means over seeds for the battery, with a simulator of *wrong physics* (a simpler model). The shaded
-# ranges are 95 % intervals of two uses:
+# of the channels' means). Here are means over seeds and kinds of faults for the battery, with a simulator of *wrong physics* (a simpler
+# model). The shaded ranges are 95 % intervals of two uses:
 
 # %%
 systems = open_study("reference_or_source")[0]["systems"]
@@ -239,8 +239,9 @@ assert min(of_battery.values()) > 0.03
 # %% [markdown]
 # **Answer.** As a reference, on the battery. As a source it adds little to what the telemetry alone finds, for a detector that measures the
 # distance from a mean. (The detectors of the battery study find no more with generated windows than with telemetry: notebook 27.) On the
-# aircraft, with ten flights, the reference finds 37 % and the telemetry alone 29 %; their intervals overlap widely. The enhanced run finds
-# hardly more than the coarse one. With the fewest known windows, no use keeps to 1 % of false alarms on the battery.
+# aircraft, with ten flights, the reference finds 37 % and the telemetry alone 29 %; their intervals overlap widely, and the enhanced run
+# finds hardly more than the coarse one. On the battery, it finds clearly more. With the fewest known windows, no use keeps to 1 % of false
+# alarms on the battery.
 #
 # ## Exercises
 #
