@@ -18,7 +18,6 @@ from enhsim_tf.simulator.model_folder import channels_of, folder_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 from enhsim_tf.telemetry.reading.channels import Channels
-from enhsim_tf.telemetry.sources import read_source
 
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
@@ -133,8 +132,7 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
     columns = simulator.alignment.columns
     try:
         return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)
-    except InputError:
-        if not set(columns) <= set(read_source(options.source, None, options.time, cleaning)):
+    except InputError as error:
+        if series.table is None or not set(columns) <= set(series.table):
             raise
-        what = f"{options.coarse} without its columns, which {options.source} has"
-        raise InputError(f"Expected the run of {simulator.alignment.name} as --coarse. Received: {what}. Swap the two.") from None
+        raise InputError(f"{error} Perhaps {options.source}, which has the columns of the run, is the run. Swap the two.") from None
