@@ -258,10 +258,10 @@ def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
     noisy = enhanced + pipeline.generate_noise(1, rng)
     rough = [np.std(np.diff(values[0])) for values in (enhanced, noisy, window["target"])]
     figure, down = new_sheet(
-        DOUBLE,
-        4.1,
+        SINGLE,
+        3.5,
         "Generated noise roughens the enhanced signal",
-        "Standard deviation of first differences in this window: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(*rough),
+        "Standard deviation of first differences here: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(*rough),
     )
     axes = panels(figure, down + 0.2, 3, 1, sharex=True, sharey=True)
     axes[0, 0].plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
@@ -270,7 +270,7 @@ def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
     axes[1, 0].plot(window["minutes"], noisy[0], color=GENERATED, linewidth=0.6)
     title_words(axes[1, 0], (("enhanced, with noise", GENERATED),))
     axes[2, 0].plot(window["minutes"], window["target"][0], color=REAL, linewidth=0.6)
-    title_words(axes[2, 0], (("real telemetry of the same time, held out", REAL),))
+    title_words(axes[2, 0], (("real telemetry of the same time", REAL),))
     name_axes(axes, FACTS)
     return figure
 
