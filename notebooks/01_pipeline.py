@@ -18,6 +18,7 @@ import numpy as np
 from lesson_tools import check_answer, claim, degraded, drawing, open_pipeline, say, show, verdict
 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED
+from enhsim_tf.paper.noise import extract_noise
 
 pipeline, budget = open_pipeline()
 
@@ -31,8 +32,9 @@ show(pipeline, "fig01_pipeline")
 # ## Step by step
 #
 # Both networks are plain Keras models. They learn from telemetry of a vehicle or a fine simulator (step 4): the enhancer from the
-# telemetry, the generator from the noise that is left when a moving average is subtracted (step 6). The example is a satellite with an
-# orbit of 480 s and a rotation of 120 s, whose amplitudes are 0.5 and 0.25. Nine lines make four windows:
+# telemetry, the generator from the noise that is left when a moving average over 25 samples is subtracted (step 6). The example is a
+# satellite with an orbit of 480 s and a rotation of 120 s, whose amplitudes are 0.5 and 0.25. The code makes four windows. Its last lines
+# are steps 4 and 6, which only training needs:
 
 # %%
 enhancer, generator = pipeline.enhancer, pipeline.generator
@@ -46,6 +48,9 @@ latent = np.random.default_rng(8).standard_normal((4, 16), "float32")  # step 7:
 noise = generator.predict(latent, verbose=0)[:, :, 0]  # steps 8 and 9: the noise
 telemetry = clean + noise  # combined
 
+recorded = pipeline.parts["train"].values.astype(float)  # step 4: real telemetry
+extracted = recorded[12:-12] - np.convolve(recorded, np.ones(25) / 25, "valid")  # step 6: its noise
+
 # %% [markdown]
 # The package wraps these steps. It must give the same numbers; sums of thousands of 32-bit products differ in the sixth decimal:
 
@@ -53,6 +58,7 @@ telemetry = clean + noise  # combined
 np.testing.assert_array_equal(held_out["coarse"], coarse)
 np.testing.assert_allclose(pipeline.enhance(coarse), clean, atol=1e-5)
 np.testing.assert_allclose(pipeline.generate_noise(4, np.random.default_rng(8)), noise, atol=1e-5)
+np.testing.assert_allclose(extract_noise(recorded, 25)[0], extracted, atol=1e-5)
 say(f"{telemetry.shape[0]} windows of {telemetry.shape[1]} samples, as {telemetry.dtype}.")
 
 # %%
@@ -131,8 +137,9 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** In a real satellite, noise often grows with the signal. Which correlation does this pipeline give between the size of the waveform
-# and the size of the noise, $\mathrm{corr}(|\mathrm{clean}|,|\mathrm{noise}|)$? Predict a round number, then compute it.
+# **2.** In telemetry, noise may grow with the signal. Which correlation does this pipeline give between the size of the waveform and the
+# size of the noise, $\mathrm{corr}(|\mathrm{clean}|,|\mathrm{noise}|)$? Predict it from the diagram, then compute it for the windows
+# `real["coarse"]`.
 
 # %%
 correlation = None  # your answer
@@ -141,7 +148,7 @@ correlation = None  # your answer
 check_answer(
     correlation,
     lambda answer: abs(answer - answers_paper.correlation_of_sizes(pipeline)) < 0.05,
-    "Does the generator get to see the waveform?",
+    "`pipeline.combine` returns clean plus noise; take the sizes of all samples of all windows.",
 )
 
 # %% [markdown]
@@ -175,12 +182,14 @@ check_answer(
 # <details><summary>2. Noise that grows with the signal</summary>
 #
 # ```python
-# correlation = 0
+# clean = pipeline.enhance(real["coarse"])
+# noise = pipeline.combine(real["coarse"], np.random.default_rng(5)) - clean
+# correlation = np.corrcoef(np.abs(clean).ravel(), np.abs(noise).ravel())[0, 1]
+# print(f"{correlation:.3f}")
 # ```
 #
-# The noise is drawn independently of the waveform, so the pipeline takes for granted that noise does not depend on the signal. Its size
-# does not depend on the level of the signal: where real noise grows with the signal, it is too large at small levels and too small at large
-# ones. The arrow that is missing in the figure leads from *clean data* (5) into the GAN (8): a generator that is given the signal as a
-# condition.
+# About 0: the noise is drawn independently of the waveform. Where real noise grows with the signal, the generated noise is therefore too
+# large at small levels and too small at large ones. The arrow that is missing in the figure leads from *clean data* (5) into the GAN (8): a
+# generator that is given the signal as a condition.
 #
 # </details>
