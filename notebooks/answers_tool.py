@@ -84,6 +84,16 @@ def ratio_without_temperature(error_with: Callable[[list[str]], float]) -> float
     return error_with(["volts", "amperes"]) / error_with(["volts", "amperes", "celsius"])
 
 
+# -- 28 ------------------------------------------------------------------------------------------------------
+
+
+def suffices_from(found: dict, environment: str, limit: float) -> int | None:
+    """Lesson 28, exercise 2: the smallest number of real windows from which on the excess stays within the limit, or None."""
+    excess, numbers = found["environments"][environment]["arms"]["real"]["excess"], found["numbers"]
+    too_many = [place for place, number in enumerate(numbers) if excess[str(number)] > limit]
+    return dict(enumerate(numbers)).get(max(too_many, default=-1) + 1)
+
+
 # -- 29 ------------------------------------------------------------------------------------------------------
 
 
