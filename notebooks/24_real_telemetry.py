@@ -121,6 +121,8 @@ with drawing(alt, height=2.2, title=title) as panel:
     panel.legend(frameon=False, ncols=3, loc="lower left")
 
 # %% [markdown]
+# The band moves and widens; its notches and bulges are anomalies.
+#
 # The pipeline learns from the first 2,000 samples, which hold ten windows without overlap. The coarse simulator is a square wave. It is
 # aligned with each window before the enhancer learns, so that only the *shape* is learned. The enhancer is ridge regression.
 
@@ -166,7 +168,7 @@ def fit_line(shape, windows):
     return levels, gains, windows - levels[:, None] - gains[:, None] * shape
 
 
-def align(windows):
+def align(windows, shapes=shapes):
     """The number of the best shape for each window, its level, its gain and the rest."""
     best, fitted = np.full(len(windows), np.inf), np.zeros((3, len(windows)))
     rest = np.zeros(windows.shape)
@@ -295,7 +297,7 @@ assert not is_full or alarms["residual"] < min(
 
 # %% [markdown]
 # Is the PCA residual as bad as that? Ten windows show it few of the phases, levels and amplitudes that come. Give it a past four times as
-# long:
+# long. And is the simulator needed? Fold the ten windows to their *mean cycle* and align that instead:
 
 # %%
 earlier = np.arange(-6_000, learned_until)
@@ -309,6 +311,12 @@ print(
     f"false alarms of the PCA residual: {alarms['PCA residual']:.0%}, with the long past {informed_alarms:.0%}"
 )
 assert informed_alarms < alarms["PCA residual"]
+
+place = (time[:learned_until] / wave.period_s % 1 * 97).astype(int)  # within the cycle
+mean_cycle = np.bincount(place, channel[:learned_until]) / np.bincount(place)
+cycles = (phases[:, None] + np.arange(window)) / wave.period_s
+folded = np.interp(cycles, (np.arange(97) + 0.5) / 97, mean_cycle, period=1)
+scores["mean cycle, aligned"] = np.sqrt(np.mean(align(windows, folded)[3] ** 2, axis=1))
 
 # %% [markdown]
 # A detector that alarms all the time finds everything. For a fair count, each threshold is now *matched*: 1 % of the nominal windows of
@@ -367,10 +375,10 @@ with drawing(alt, 5, 1.9, title, sharey=True) as panels:
 
 # %% [markdown]
 # *What to see:* wrong shapes and clocks leave a large rest. A spike is one sample of 194, whose square counts little in the mean over the
-# window; the largest step misses none. Between the edges of
-# a swell, the gain takes it up, which is what the gain is for; the moving deviation sees it. No score sees everything. With a long past,
-# the PCA residual is as good as the aligned simulator: what the simulator brings here is that ten windows are enough. All of this is one
-# draw of noise and anomalies: a difference of one find means nothing.
+# window; the largest step misses none. Between the edges of a swell, the gain takes it up, which is what the gain is for; the moving
+# deviation sees it. No score sees everything. With a long past, the PCA residual is as good as the aligned simulator, and so is the mean
+# cycle of the same ten windows, aligned in the same way: what brings it here is the alignment. All of this is one draw of noise and
+# anomalies: a difference of one find means nothing.
 
 # %%
 plateau = np.zeros(len(starts), bool)  # windows that lie within the swollen cycles, apart from the edges
@@ -388,7 +396,8 @@ if is_full:
     assert table["residual"]["lost dip"] == table["residual"]["stuck"] == table["residual"]["late"] == 4
     assert table["largest step"]["spike"] > table["residual"]["spike"]
     assert inside["moving deviation"] > inside["residual"] + 0.3
-    assert areas["residual"] == max(area for name, area in areas.items() if name != "PCA residual, long past")
+    as_good = areas["mean cycle, aligned"], areas["PCA residual, long past"]
+    assert max(areas[name] for name in detectors) == areas["residual"] < min(as_good) + 0.05
 
 # %% [markdown]
 # ## A real spacecraft
@@ -437,8 +446,8 @@ assert found["num_sequences"] == 8
 
 # %% [markdown]
 # **Answer.** On the one channel made here, yes: the residual has a higher AUC-PR than both scores of one line. A PCA residual with a long
-# past is as good. On the spacecraft, the residuals have the highest means, but six channels do not establish an advantage over simple
-# scores.
+# past and an aligned mean cycle are as good. On the spacecraft, the residuals have the highest means, but six channels do not establish an
+# advantage over simple scores.
 #
 # ## Exercises
 #
