@@ -38,7 +38,8 @@ telemetry = signal + sunlight[:, None] * [0.3, 0.25] + own
 
 # %% [markdown]
 # Two temperatures of one panel follow a current that the simulator knows, and sunlight that it does not know. Cut windows, and map the
-# simulator's windows to both channels at once. What this leaves of a window is a residual of two channels:
+# simulator's windows to both channels at once. What this leaves of a window is a residual of two channels; those of the known windows are
+# by [cross-fitting](../docs/glossary.md#cross-fitting), so that no window is judged by a matrix that was fitted to it:
 
 
 # %%
@@ -139,8 +140,9 @@ detectors = {
 # %% [markdown]
 # The fault: the second sensor feels the sunlight of another time, as if it sat elsewhere. The residual windows of each channel stay as they
 # were; only their pairs change. The last row asks whether the simulator is needed at all: its detector learns the telemetry itself. (The
-# same windows, from which all training windows are drawn, set the thresholds. With 4 or 8 numbers for each of 780 windows this costs
-# little, as the false alarms show; with 20 of 500 directions it does not, see notebook 28.)
+# same windows, from which all training windows are drawn, set the thresholds. With 4 or 8 numbers for each of 780 windows this hardly
+# changes the threshold, as the false alarms show. A PCA residual of 20 directions of 500 needs other windows for its threshold, see
+# notebook 28.)
 
 # %%
 other = np.random.default_rng(2).permutation(len(new_residuals))
@@ -181,9 +183,10 @@ assert rates["each channel alone"][0] < 0.05 and rates["both, without a simulato
 #
 # `fit` learns all columns of a file together: one enhancer, residual windows drawn for all channels at once, and detectors of all channels.
 # Its report compares the cross-correlation of the noise with that of two halves of real noise, and says how many injected anomalies each
-# detector finds ([recall](../docs/glossary.md#recall)), of one channel and of the *relation* between channels. The *PCA residual* is that
-# of notebook 13, and the *innovation* is what a linear prediction from the past of all channels does not explain. The *largest step* and
-# the *moving deviation* look at each channel alone, and find no relation.
+# detector finds ([recall](../docs/glossary.md#recall)), of one channel and of the *relation* between channels. With several channels,
+# *residual* is the Mahalanobis distance above, of the means of whole windows and of quarters. The *PCA residual* is that of notebook 13,
+# and the *innovation* is what a linear prediction from the past of all channels does not explain. The *largest step* and the *moving
+# deviation* look at each channel alone, and find no relation.
 
 # %%
 from enhsim_tf import FitOptions, clean, fit, read_recording, read_source
@@ -204,8 +207,8 @@ print("\n".join(line for line in report.lines() if "correlation of the noise" in
 #
 # ## Exercises
 #
-# **1.** Another fault that no channel shows alone: the second channel is *late* by a tenth of a window. The next cell makes these
-# residuals, `delayed`. Give the share that the detector of noise drawn jointly finds.
+# **1.** Another fault that no channel shows alone: the second sensor feels the *sunlight* a tenth of a window late, while its response to
+# the current stays on time. The next cell makes these residuals, `delayed`. Give the share that the detector of noise drawn jointly finds.
 
 # %%
 earlier = cut(telemetry, later - 10) - ridge.predict(cut(current, later - 10)).reshape(-1, window, 2)
@@ -239,7 +242,7 @@ check_answer(
 # %% [markdown]
 # ## Solution
 #
-# <details><summary>1. A late channel</summary>
+# <details><summary>1. Late sunlight</summary>
 #
 # ```python
 # score = detectors["both, noise drawn jointly"]
