@@ -40,7 +40,7 @@ error = np.sqrt(np.mean((inputs["volts"] - target) ** 2)) / np.std(target)
 with drawing(
     "Voltage of the battery as measured and as simulated, over three hours",
     height=2.2,
-    title=f"The coarse simulator has the timing, but not the level (error {error:.0%})",
+    title=f"The coarse simulator has the timing, but not the amplitude (error {error:.0%})",
 ) as panel:
     panel.plot(hours, target[:1_200], color=REAL, linewidth=0.8, label="telemetry")
     panel.plot(hours, inputs["volts"][:1_200], color=COARSE, linestyle=DASHED, label="coarse simulator")
@@ -246,13 +246,21 @@ say(
     )
     + "."
 )
+found = in_fault & (scores["enhanced run"] > threshold)
+amperes = scores_of(planned.values[:, simulator.columns.index("amperes")])[1]
+say(
+    f"Current (rms) in windows of the fault: **{amperes[found].mean():.1f} A** where the enhanced run finds it, "
+    f"**{amperes[in_fault & ~found].mean():.1f} A** where not."
+)
+assert amperes[found].mean() > 2 * amperes[in_fault & ~found].mean()
 assert alarms["enhanced run"][1] > alarms["coarse run"][1]
 assert scores["enhanced run"][in_fault].min() < scores["enhanced run"][before].max()
 
 # %% [markdown]
 # *What to see:* from the onset on, the enhanced run's curve lies above its threshold, except in some stretches in which both curves fall:
-# there, they are as low as before the fault. The coarse run's threshold must bear its error on nominal time, so only the higher part of its
-# curve is found. (Windows that straddle the onset or the end of the fault count in neither share.)
+# there, they are as low as before the fault. Hardly any current flows there, and a resistance without current shows nothing. The coarse
+# run's threshold must bear its error on nominal time, so only the higher part of its curve is found. (Windows that straddle the onset or
+# the end of the fault count in neither share.)
 #
 # ## What the study found
 #
@@ -284,8 +292,8 @@ assert (
 #
 # ## Exercises
 #
-# **1.** Delay the simulator's run by 7 samples against the telemetry, and let the package find the delay. Complete the call: which sign
-# does the estimated delay have, and how large is it in seconds?
+# **1.** The next cell puts the telemetry 7 samples early against the simulator's run. Let `estimate_delay` find it: which sign does the
+# delay have, and how large is it in seconds?
 
 # %%
 from enhsim_tf.coarse_simulator.pairing import estimate_delay  # noqa: F401  for your answer
