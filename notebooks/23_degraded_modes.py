@@ -82,9 +82,10 @@ _ = verdict(pipeline, "C9")
 # %% [markdown]
 # ## A score that needs no truth
 #
-# How far is a coarse window from those that the enhancer learned from? The principal components of the training windows split it in two.
-# *Outside* of them lies what the enhancer has never seen at all. *Within* them, it interpolates between training windows, so that only
-# the distance to the nearest one counts, and counts less:
+# How far is a coarse window from those that the enhancer learned from? The principal components with 95 % of the variance of the training
+# windows split it in two. *Outside* of them lies what is rare in training windows (a twentieth of their variance, which is why no score is
+# near 0), and all that they never showed. *Within* them, it interpolates between training windows, so that only the distance to the nearest
+# one counts, and counts less:
 #
 # $$s=\frac1\sigma\sqrt{\tfrac1N\lVert r\rVert^2+\tfrac14\cdot\tfrac1N\min_i\lVert c-c_i\rVert^2}$$
 #
@@ -167,7 +168,8 @@ print(pd.DataFrame(rows).T.rename_axis("severity").round(2).to_string())
 #
 # What if the training has windows with simulated faults, too? It needs the true response to them, which an operator who has never seen a
 # failure does not have; a fine simulator may. Ridge regression (notebook 04) shows the effect: fitted to nominal windows, and fitted to
-# nominal windows and all modes up to severity 0.5. Both are judged on other windows.
+# nominal windows and all modes up to severity 0.5. Both are judged on other windows. (The first learns its 500 windows four times with new
+# noise; the second learns 500 of each of 19 cases.)
 
 # %%
 from enhsim_tf.enhancer.ridge import fit_ridge
@@ -256,7 +258,8 @@ assert errors["paper"]["outside"] > errors["coarse"]["outside"]
 # window, without the truth. Of windows that are stuck at severity 0.05 it flags few, and there the error is hardly larger than nominal. At
 # severity 0.1, it lets more than half pass, although the median error is nearly twice the nominal one. It looks at the coarse run alone, so
 # it cannot tell whether that run is right. Training on simulated faults lowers the error from severity 0.25 on, also beyond the severities
-# that it has shown. It needs the true response to faults.
+# that it has shown. On nominal windows it raises the error of ridge regression, in the study from 0.030 to 0.081. It needs the true
+# response to faults.
 #
 # ## Exercises
 #

@@ -88,7 +88,7 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        "Enhancers follow five of six faults only after learning faults",
+        "Except with friction, both enhancers trained on faults beat the paper's network",
         "Root-mean-square error with respect to the true degraded signal, in standard deviations of the nominal signal; means over seeds. "
         "“On faults”: trained on random configurations of all modes, with severities in the grey area.",
     )
