@@ -261,8 +261,8 @@ for about in published["arms"]["ridge + residual windows"]["by_environment"].val
 # standard deviation, and finds those that few random cuts separate from the rest. A *dense autoencoder* is a network that presses a window
 # through a layer of 16 units and scores what it cannot restore. Each is trained on the enhanced signal with the GAN's noise. It counts *as
 # good as if trained on telemetry* if its false alarms are at most twice those after training on real windows plus one point, and its
-# [recall](../docs/glossary.md#recall) is at most five points lower. C8 holds in part if half of the detectors are as good, and fully if all
-# are.
+# [recall](../docs/glossary.md#recall) of the six degraded modes (notebook 23) is at most five points lower. C8 holds in part if half of the
+# detectors are as good, and fully if all are.
 
 # %%
 (record,) = verdict(pipeline, "C8")
@@ -274,10 +274,11 @@ for name in ("PCA residual", "isolation forest", "dense autoencoder"):
         print(f"{name:18} {arm:21} false alarms and recall", *about)
 
 # %% [markdown]
-# **Answer.** The part of the training windows that the detector cannot describe. It must be as large as the part of real windows that the
-# detector cannot describe. Where the signal is right, that is the noise. For the PCA residual, its scale must be right to a few per cent,
-# and noise of few directions or of another kind sets a wrong threshold even then. Noise drawn from real noise or residuals set a right one
-# in each case tried here. (How many faults a detector finds is another matter: with no false alarm at all, it may find none.)
+# **Answer.** For the PCA residual: the part of the training windows that it cannot describe. It must be as large as the part of real
+# windows that it cannot describe. Where the signal is right, that is the noise: its scale must be right to a few per cent, and noise of few
+# directions or of another kind sets a wrong threshold even then. Other detectors look at other things, so the same windows give them other
+# rates (the study). Noise drawn from real noise or residuals set a right one in each case tried here. (How many faults a detector finds is
+# another matter: with no false alarm at all, it may find none.)
 #
 # ## Exercises
 #
