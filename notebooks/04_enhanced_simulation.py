@@ -53,7 +53,7 @@ show(pipeline, "fig04_enhanced_simulation")
 
 # %% [markdown]
 # *What to see:* the error is a fraction of the simulator's own. But the enhanced signal is not as smooth as the truth: the steps from
-# sample to sample are larger.
+# sample to sample are larger. (Ridge regression in the subtitle is the subject of the next section; the figure's tries other penalties.)
 
 
 # %%
@@ -156,8 +156,9 @@ with drawing(alt, height=1.7, title=title) as panel:
     panel.invert_yaxis()
 
 # %% [markdown]
-# *What to see:* all three estimates are far better than the simulator, and the one matrix comes closest to the truth. On the few
-# windows that occur, one matrix is enough for the map from square waves to sines. So few that all held-out inputs occurred in training:
+# *What to see:* all three estimates are far better than the simulator, and the one matrix comes closest to the truth. On the few windows
+# that occur, one matrix is enough for the map from square waves to sines. Only 480 different inputs occur (notebook 02), and all those of
+# the held-out windows occurred in training:
 
 # %%
 seen = {window.tobytes() for window in train["coarse"]}
@@ -176,8 +177,7 @@ claim("C1")
 # ## The verdict
 #
 # C1 compares the error with that of the simulator, and, to hold in full, with 0.15, a limit of this project ([report](../docs/report.md)).
-# The comparison with ridge regression is this project's. (The reproduction tries other penalties, so its ridge regression has another
-# error.)
+# The comparison with ridge regression is this project's.
 
 # %%
 (record,) = verdict(pipeline, "C1")

@@ -23,9 +23,9 @@ pipeline, budget = open_pipeline()
 # %% [markdown]
 # ## The network
 #
-# The *latent vector* $z$ holds 16 independent random numbers from a normal distribution. Each draw of $z$ gives one window of noise
-# $G(z)$. Batch normalisation subtracts from each neuron its mean over the batch and divides by its standard deviation. The tanh keeps the
-# noise between −1 and 1.
+# The *latent vector* $z$ holds 16 independent random numbers from a normal distribution. Each draw of $z$ gives one window of noise $G(z)$.
+# Batch normalisation subtracts from each neuron its mean over the batch and divides by its standard deviation; a scale and a shift, both
+# learned, follow. The tanh keeps the noise between −1 and 1.
 
 # %%
 import keras
@@ -183,8 +183,9 @@ assert beyond["generated, before the tanh"] < 1e-9 and beyond["real noise"] > 0.
 assert rank(generated) < rank(real) / 2
 
 # %% [markdown]
-# **Answer.** Sixteen numbers and 64 neurons write every window as a sum of 64 shapes, so that generated windows differ from each other in
-# few dimensions, and real ones in nearly all. The PCA residual of notebook 13 looks at just that: what lies outside the main dimensions.
+# **Answer.** The 64 neurons: before the tanh, every window is a sum of 64 shapes, so that generated windows differ from each other in at
+# most 64 dimensions, and not equally in all of these, and real ones in nearly all 500. What the 16 numbers limit, exercise 2 asks. The PCA
+# residual of notebook 13 looks at just that: what lies outside the main dimensions.
 #
 # ## Exercises
 #

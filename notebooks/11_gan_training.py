@@ -174,7 +174,8 @@ recorded = list(frames)
 slider(draw, "iteration", recorded, shown=(recorded[0], recorded[len(recorded) // 5], recorded[-1]))
 
 # %% [markdown]
-# *What to see:* after five iterations the noise is far too large, and the generator learns first of all to make smaller noise.
+# *What to see:* after five iterations the noise is far too large, and the generator learns first of all to make smaller noise. Later it
+# comes near to the real size.
 
 # %%
 history = np.array(list(share.values()))
@@ -214,8 +215,8 @@ for (phase, name), (number, total) in moved.items():
 
 # %% [markdown]
 # **Answer.** The discriminator learns from tags, and its gradient tells the generator how to change its windows so that they are taken for
-# real. After 1,000 iterations, the noise has nearly the real standard deviation. (The GAN of notebook 12 is the
-# pipeline's, with other draws, so its curve is another.)
+# real. After 1,000 iterations, the noise has nearly the real standard deviation. This is not yet the same as looking real: notebooks 05 and
+# 10 find differences. (The GAN of notebook 12 is the pipeline's, with other draws, so its curve is another.)
 #
 # ## Exercises
 #

@@ -80,7 +80,8 @@ stack = keras.Sequential([generator, discriminator])
 stack.compile("adam", "binary_crossentropy")
 
 # %% [markdown]
-# The loop of the tutorials. The losses are computed separately, before each update.
+# The loop of the tutorials. As there, the discriminator gets real and generated noise in two updates instead of one. The losses are
+# computed separately, before each update.
 
 # %%
 rng, real_labels, generated_labels = np.random.default_rng(0), np.ones((64, 1)), np.zeros((64, 1))
