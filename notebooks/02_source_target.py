@@ -135,8 +135,7 @@ assert distinct == 480
 #
 # ## Exercises
 #
-# **1.** What is the smallest NRMSE that a square wave of the right period can have for a sine? Give a formula or a number with three
-# decimals.
+# **1.** What is the smallest NRMSE that a square wave of the right period can have for a sine? Give a formula.
 
 # %%
 smallest_nrmse = None  # your answer
@@ -146,7 +145,7 @@ from notebooks import answers_paper
 
 check_answer(
     smallest_nrmse,
-    lambda answer: abs(answer - answers_paper.smallest_nrmse()) < 1e-3,
+    lambda answer: abs(answer - answers_paper.smallest_nrmse()) < 1e-5,
     "At the best height, the mean square error over half a period is the variance of the sine there.",
 )
 
@@ -156,7 +155,7 @@ check_answer(
 
 
 # %%
-def num_distinct(orbit_s, rotation_s): ...  # your code: an argument in whole numbers
+def num_distinct(orbit_s, rotation_s): ...  # your code: count samples; a period may end in half a second
 
 
 # %%

@@ -131,9 +131,9 @@ def draw(width):
 slider(draw, "width", range(3, 242, 2), shown=(25, 3, 121), unit="samples")
 
 # %% [markdown]
-# *What to see:* a narrow average follows the noise itself and removes it. A wide one no longer follows the 2-minute wave, which then is
-# called noise. A good width is therefore short against the fastest signal, and so long that $1/w$ is small. (Noise with a memory: exercise
-# 2.) The formula says the same for all widths:
+# *What to see:* a narrow average follows the noise itself, so that subtracting it removes a part of the noise. A wide one no longer follows
+# the 2-minute wave, which then is called noise. A good width is therefore short against the fastest signal, and so long that $1/w$ is
+# small. (Noise with a memory: exercise 2.) The formula says the same for all widths:
 
 # %%
 widths = np.arange(3, 122, 2)
@@ -194,7 +194,7 @@ assert np.abs(correlations - closed_form).max() < 0.01
 # ## Exercises
 #
 # **1.** For which odd width from 3 to 121 is the standard deviation of the extracted noise closest to the one that was put in? Is the
-# extracted noise then the noise that was put in?
+# extracted noise then the noise that was put in, or do two errors cancel?
 
 # %%
 best_width = None  # your answer, in samples
@@ -205,7 +205,7 @@ from notebooks import answers_paper
 check_answer(
     best_width,
     lambda width: width in answers_paper.best_widths(values[:50_000], widths, true_sd),
-    "Compute the standard deviation for each width, or read it off the plot above.",
+    "Compare with the dotted line in the plot above, then compute.",
 )
 
 # %% [markdown]

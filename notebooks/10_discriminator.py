@@ -167,6 +167,7 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
         panel.plot(recorded, other, "o", color=REAL, markersize=2, alpha=0.4)
         panel.axline((recorded.mean(), recorded.mean()), slope=1, color=QUIET, linewidth=0.8)
         panel.set(title=name, xlabel="probability real, as recorded")
+        panel.margins(0.06)
     panels[0].set(ylabel="probability real, changed")
 
 # %% [markdown]
@@ -237,9 +238,10 @@ with drawing(alt, height=1.7, title=title) as panel:
     panel.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
 
 # %% [markdown]
-# *What to see:* the discriminator is near its floor, and the other two judges are far from theirs. Generated windows differ from
-# real ones, and a linear classifier is enough to find it. The lost places are not the whole reason: the power of each frequency holds no
-# places either. The generator learns from the discriminator alone, which at this point cannot tell the two apart.
+# *What to see:* the discriminator is near its floor and near 0.5, and the other two judges are far from their floors. (A floor below 0.5
+# shows how far chance, or a difference between training and held-out windows, moves the AUC.) Generated windows differ from real ones, and
+# a linear classifier is enough to find it. The lost places are not the whole reason: the power of each frequency holds no places either.
+# The generator learns from the discriminator alone, which at this point cannot tell the two apart.
 
 # %%
 for name in judges:
