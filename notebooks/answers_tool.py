@@ -57,6 +57,14 @@ def error_ratio(
     return float(np.median(errors[above]) / np.median(errors[~above]))
 
 
+# -- 25 ------------------------------------------------------------------------------------------------------
+
+
+def rank_when_drawn_again(windows: np.ndarray, number: int) -> float:
+    """Lesson 25, exercise 2: the effective rank of as many windows, drawn from the given ones with replacement."""
+    return measures.effective_rank(windows[np.random.default_rng(0).integers(0, len(windows), number)])
+
+
 # -- 26 ------------------------------------------------------------------------------------------------------
 
 
