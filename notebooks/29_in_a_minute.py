@@ -13,8 +13,7 @@
 #
 # **What the paper says** (section 2): windows of 500 samples, hidden layers of 3,200 neurons, 40 epochs and about 1,000 iterations. Here
 # everything is smaller. The same code runs, and nothing is taken from a cache. (*Filters* are those of the discriminator's convolution,
-# *rows* the windows in a batch of the GAN, and *rounds* how many times that number of iterations the GAN is trained for, so that it can be
-# followed beyond.)
+# *rows* the windows in a batch of the GAN, and *iterations* and *rounds* say how long the GAN is trained: for *rounds* times *iterations*.)
 
 # %%
 import json
@@ -47,9 +46,9 @@ pipeline = Pipeline(make_settings(**small), Stages(Path(cache.name), tell=lambda
 # ## Train
 #
 # The enhancer consists of dense layers that minimise the mean squared error between their output and the telemetry (notebook 03). Here it
-# is trained by hand; `enhance` trains the same network from other first weights when it is first called. `generate_noise` trains the GAN:
-# in each iteration, the discriminator lowers its cross-entropy on real and generated noise, and then the generator learns to be taken for
-# real (its code is in notebook 11).
+# is trained by hand; `enhance` trains the same network from other first weights when it is first called. `generate_noise` trains the GAN
+# when it is first called: in each iteration, the discriminator lowers its cross-entropy on real and generated noise, and then the generator
+# learns to be taken for real. [Notebook 11](11_gan_training.ipynb) has its code: `train_step`.
 
 # %%
 started = perf_counter()
@@ -62,6 +61,10 @@ by_hand.compile("adam", "mean_squared_error")
 by_hand.fit(train["coarse"], train["target"], batch_size=15, epochs=10, verbose=0)
 enhanced = pipeline.enhance(test["coarse"])
 noise = pipeline.generate_noise(len(enhanced), np.random.default_rng(0))
+right = np.mean([pipeline.history[f"accuracy_{kind}"][-3:] for kind in ("real", "generated")])
+print(
+    f"GAN: {pipeline.settings.iterations} iterations; the discriminator is right about {right:.0%} of windows"
+)
 print(f"all networks trained in {perf_counter() - started:.0f} s on the machine that ran this")
 
 # %%
@@ -180,7 +183,8 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** How large is the small enhancer? Give its number of parameters, computed by hand (notebook 03).
+# **2.** How large is the small enhancer? Give its number of parameters, computed by hand. (A dense layer from m to n units has m weights
+# and one shift for each of its n units; the sizes are in the cell that trains it by hand.)
 
 # %%
 num_parameters = None  # your answer
@@ -189,7 +193,7 @@ num_parameters = None  # your answer
 check_answer(
     num_parameters,
     lambda count: count == answers_tool.num_parameters(pipeline),
-    "Notebook 03 counts them layer by layer.",
+    "Count layer by layer: weights and shifts.",
 )
 
 # %% [markdown]
