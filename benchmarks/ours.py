@@ -7,30 +7,27 @@ import numpy as np
 
 from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
-from enhsim_tf.common.backend import keras, tf
-from enhsim_tf.common.training import dense_stack, fit_windows
+from enhsim_tf.common.backend import tf
 from enhsim_tf.datasets.labelled_windows import write_windows_labelled
 from enhsim_tf.datasets.places import Share
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.paper import noise as of_paper
+from enhsim_tf.paper.enhancer import build_enhancer, enhance, train_enhancer
 from enhsim_tf.paper.settings import make_settings
 from enhsim_tf.simulator.alignment import Waves
 
 
-def _network() -> keras.Model:
-    return dense_stack(WINDOW, (WINDOW, HIDDEN_UNITS, HIDDEN_UNITS, WINDOW), seed=0, name="enhancer")
-
-
 def enhancer_step(num_steps: int) -> Work:
-    """Prepares training steps of 15 windows by `fit_windows`."""
+    """Prepares training steps of 15 windows by `train_enhancer`."""
     source, target = example_windows(15 * num_steps)
-    model = _network()
+    settings = make_settings(epochs=2)
+    model = build_enhancer(settings)
 
     def run() -> float:
         clock, seconds_of_last = epoch_clock()
-        fit_windows(model, source, target, epochs=2, batch_size=15, seed=0, callbacks=[clock])
+        train_enhancer(model, source, target, settings, callbacks=[clock])
         return seconds_of_last()  # the first epoch compiles
 
     return run, num_steps
@@ -53,7 +50,7 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
 def simulator() -> EnhancedSimulator:
     """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
     waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
-    layers = tuple(tuple(layer.get_weights()) for layer in _network().layers)
+    layers = tuple(tuple(layer.get_weights()) for layer in build_enhancer(make_settings()).layers)
     enhancer = Enhancer(NETWORK, WINDOW, 1, 1, np.zeros(1, np.float32), np.zeros(WINDOW, np.float32), layers=layers)
     residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, WINDOW, 1)).astype(np.float32)
     alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, WINDOW)
@@ -62,11 +59,8 @@ def simulator() -> EnhancedSimulator:
 
 def enhance_and_noise(num_windows: int) -> Work:
     """Prepares the enhancement of existing coarse windows by the paper's networks and the generation of their noise, in memory."""
-    from enhsim_tf.paper.enhancer import build_enhancer as build
-    from enhsim_tf.paper.enhancer import enhance
-
     settings = make_settings()
-    enhancer, generator = build(settings), of_paper.build_generator(settings)
+    enhancer, generator = build_enhancer(settings), of_paper.build_generator(settings)
     coarse = example_windows(num_windows)[0]
     noise = np.random.default_rng(0)
     return lambda: enhance(enhancer, coarse) + of_paper.generate_noise(generator, num_windows, settings, noise), num_windows

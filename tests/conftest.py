@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import functools
 import gc
 import os
 import signal
@@ -80,7 +81,7 @@ def narrow_enhancer():
     from enhsim_tf.enhancer import candidates
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(candidates, "_PAPER_UNITS", 256)
+        patch.setattr(candidates, "Settings", functools.partial(candidates.Settings, hidden_units=256))
         yield
 
 

@@ -17,10 +17,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import Ridge, fit_ridge
+from enhsim_tf.paper.settings import Settings
 
-_PAPER_UNITS = 3_200  # units of each hidden layer of the paper's network
-_PAPER_RATE = 1e-3  # its initial learning rate, which falls to zero along a cosine
-_BATCH_SIZE = 15  # as in the paper
 _NUM_FEATURES = 1_000  # random rectified features
 _NEGLIGIBLE = 0.02  # share of the best candidate's squared error: 1 % of its error
 NUM_FOLDS = 3  # folds of interleaved blocks, so that each fold covers the beginning, the middle and the end of the time
@@ -207,14 +205,14 @@ class _Training:
 
 
 def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Trains the paper's network; returns kernel and bias of each Dense layer."""
+    """Trains the paper's network, whose learning rate falls to zero here; returns kernel and bias of each Dense layer."""
     from enhsim_tf.common.backend import keras
-    from enhsim_tf.common.training import dense_stack, fit_windows
+    from enhsim_tf.paper.enhancer import build_enhancer, train_enhancer
 
-    outputs = wanted.shape[1]
-    network = dense_stack(rows.shape[1], (outputs, _PAPER_UNITS, _PAPER_UNITS, outputs), seed, "enhancer")
-    falling = keras.optimizers.schedules.CosineDecay(_PAPER_RATE, epochs * -(-len(rows) // _BATCH_SIZE))
-    fit_windows(network, rows, wanted, epochs, _BATCH_SIZE, seed, falling)
+    settings = Settings(seed=seed, epochs=epochs, window=wanted.shape[1])
+    falling = keras.optimizers.schedules.CosineDecay(settings.learning_rate, epochs * -(-len(rows) // settings.batch_size))
+    network = build_enhancer(settings, num_inputs=rows.shape[1])
+    train_enhancer(network, rows, wanted, dataclasses.replace(settings, learning_rate=falling))
     return [tuple(layer.get_weights()) for layer in network.layers]
 
 

@@ -18,17 +18,21 @@ def initialiser(settings: Settings, of_author: str, number: int) -> keras.initia
     return type(keras.initializers.get(name))(seed=1_000 * settings.seed + number)
 
 
-def build_enhancer(settings: Settings) -> keras.Sequential:
+def build_enhancer(settings: Settings, num_inputs: int | None = None) -> keras.Sequential:
     """The network of Figure 3, read as Dense 500, two hidden layers of 3,200, and Dense 500: 13,697,400 parameters.
 
     "The input and output layers are the size of the time series. The inner layers are wider, at 3,200 neurons."
 
+    Args:
+        settings: All settings.
+        num_inputs: Number of inputs, for the tool, whose coarse simulators can have several columns; None: `window`.
+
     Returns:
-        An uncompiled network from `(windows, window)` to `(windows, window)`.
+        An uncompiled network from `(windows, num_inputs)` to `(windows, window)`.
     """
     names = ["Input", *(f"Hidden_{number + 1}" for number in range(settings.num_hidden)), "Output"]
     units = [settings.window, *[settings.hidden_units] * settings.num_hidden, settings.window]
-    network = keras.Sequential([keras.Input((settings.window,))], name="enhancer")
+    network = keras.Sequential([keras.Input((num_inputs or settings.window,))], name="enhancer")
     for number, (name, width) in enumerate(zip(names, units, strict=True)):
         activation = "linear" if name == "Output" else "relu"
         kernel = initialiser(settings, "glorot_uniform", number)

@@ -73,7 +73,7 @@ class _Autoencoder:
 
     def fit(self, windows: np.ndarray) -> "_Autoencoder":
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
-        from enhsim_tf.common.training import fit_windows
+        from studies.common.training import fit_windows
 
         windows = flat(windows)
         self._mean, self._scale = np.mean(windows), np.std(windows)
@@ -94,7 +94,7 @@ class DenseAutoencoder(_Autoencoder):
     """Dense autoencoder with hidden layers of 128 units and a bottleneck of 16."""
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
-        from enhsim_tf.common.training import dense_stack
+        from studies.common.training import dense_stack
 
         return dense_stack(samples, (128, 16, 128, samples), seed=self.seed, name="autoencoder")
 
@@ -112,7 +112,7 @@ class ConvolutionalAutoencoder(_Autoencoder):
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.backend import keras
-        from enhsim_tf.common.training import seeded_initialiser
+        from studies.common.training import seeded_initialiser
 
         missing = -samples % 16  # number of zeros that are appended to a window and removed from the output
         layers, kernels = keras.layers, [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)]

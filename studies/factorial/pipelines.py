@@ -140,7 +140,7 @@ class Pipelines:
 
         _ = self.example.telemetry
         depends = (self.settings.paper.of("windows"), self.settings.second)
-        folder = self.stages.run("second network", self._train_second, depends, ("telemetry",), version=2)
+        folder = self.stages.run("second network", self._train_second, depends, ("telemetry",), version=3)
         with np.load(folder / "enhancer.npz") as arrays:
             number = sum(name.startswith("kernel_") for name in arrays)
             layers = tuple((arrays[f"kernel_{layer}"], arrays[f"bias_{layer}"]) for layer in range(number))

@@ -66,7 +66,7 @@ def _random_features(coarse: np.ndarray, telemetry: np.ndarray, folds: np.ndarra
 def _convolution(coarse: np.ndarray, telemetry: np.ndarray, starts: np.ndarray, seed: int) -> Map:
     """A small convolutional network on what ridge regression leaves."""
     from enhsim_tf.common.backend import keras
-    from enhsim_tf.common.training import seeded_initialiser
+    from studies.common.training import seeded_initialiser
 
     ridge = fit_enhancer("ridge", coarse, telemetry, starts, seed)
     left = telemetry - ridge.predict(coarse)

@@ -71,7 +71,7 @@ def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stag
     fits = {}
     for enhancer in ENHANCERS:
         fit = functools.partial(_fit, channel=channel, enhancer=enhancer, settings=settings, stages=stages)
-        fits[enhancer] = stages.run(f"fit {name} {enhancer}", fit, depends, version=2)
+        fits[enhancer] = stages.run(f"fit {name} {enhancer}", fit, depends, version=3)
 
     def judge(folder: Path) -> None:
         from enhsim_tf.simulator.simulator import EnhancedSimulator

@@ -7,8 +7,8 @@ import tensorflow as tf
 
 from enhsim_tf.common import fast_keras
 from enhsim_tf.common.fast_keras import convolution_maximum, fused_adam, is_wide_dense_stack, with_fast_convolution
-from enhsim_tf.common.training import dense_stack, fit_windows
 from enhsim_tf.paper import noise as of_paper
+from studies.common.training import dense_stack, fit_windows
 from tests.paper.conftest import tiny_settings
 
 RNG = np.random.default_rng

@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "enhsim_tf"
-WITH_NETWORKS = "common.backend", "common.training", "common.fast_keras"
+WITH_NETWORKS = "common.backend", "common.fast_keras"
 NOT_TRIED = ("paper", "own_channel", "__main__")
 
 

@@ -21,9 +21,9 @@ from scipy.special import gammaln
 
 from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.training import seeded_initialiser
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
+from studies.common.training import seeded_initialiser
 
 _NUM_LAGS, _NUM_NEAR = 64, 16  # last samples that the linear prediction, and the hidden layers, see one by one
 _SIGNAL_LAGS = np.array([-8, 0, 8])  # where it sees the enhanced signal, around the sample

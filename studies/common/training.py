@@ -1,4 +1,4 @@
-"""Training and prediction of networks that map windows to windows, such as the enhancer of section 2.2 of the paper."""
+"""Training of the studies' networks that map windows to windows."""
 
 from collections.abc import Sequence
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from enhsim_tf.common.training import dense_stack
 from enhsim_tf.paper.enhancer import predict
+from studies.common.training import dense_stack
 
 
 def test_layers_and_seeds_are_independent():
