@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.cli.options import counted, for_each, output_paths, refuse_same_file
-from enhsim_tf.coarse_simulator.degraded import ScheduledMode
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
@@ -20,6 +19,7 @@ from enhsim_tf.datasets.plan import Plan, make_plan
 from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
+from enhsim_tf.telemetry.placing import PlacedEvent
 
 
 def run_generate(options: argparse.Namespace) -> int:
@@ -63,7 +63,7 @@ def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, pat
     length = parse_num_samples(options.continuous, interval_s)
     if options.at or options.number:
         index, lengths = series_index(length, interval_s, options.start), length_limits(options.length, interval_s)
-        given = [ScheduledMode(place.kind, place.severity, *place.samples(index, interval_s)) for place in options.at]
+        given = [PlacedEvent(place.kind, place.severity, *place.samples(index, interval_s)) for place in options.at]
         rng = np.random.default_rng([seed, 3])
         schedule = draw_schedule(simulator, length, given, options.scenario, options.number or 0, lengths, rng)
     elif options.scenario:

@@ -1,8 +1,7 @@
-"""Degraded modes of the coarse simulator, for a whole window or for some samples of a series (sections 1 and 3 of the paper)."""
+"""Degraded modes of the coarse simulator (sections 1 and 3 of the paper)."""
 
 import dataclasses
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -69,49 +68,9 @@ def degrade(
     return degraded.degrade(signal, time_s, scenario.mode, scenario.severity, levels, shortest_period_s, rng, onset)
 
 
-@dataclasses.dataclass(frozen=True)
-class ScheduledMode:
-    """A degraded mode during some samples of a series, as during a window with the onset 0; the signal is nominal after the last of them.
-
-    Raises:
-        InputError: If the mode is unknown or a number is out of range.
-    """
-
-    mode: str  # one of `MODES`
-    severity: float  # from 0 to 1
-    begin: int  # first sample
-    length: int  # number of samples
-
-    def __post_init__(self):
-        Degraded(self.mode, self.severity, 0.0)
-        if self.begin < 0 or self.length < 1:
-            raise InputError(f"Expected an event of at least one sample, from sample 0 on. Received: {self}.")
-
-    @property
-    def end(self) -> int:
-        """First sample after the event."""
-        return self.begin + self.length
-
-
 def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int] | None:
     """Returns the first sample and the end at which a stuck mechanism stands still in a window or series; None if it is not stuck."""
     if scenario is None or scenario.mode != "stuck" or scenario.severity == 0:
         return None
     begin = min(scenario.first_sample(num_samples), num_samples - 1)
     return begin, begin + int(round(scenario.severity * (num_samples - 1 - begin), 6)) + 1
-
-
-def check_schedule(schedule: Sequence[ScheduledMode], num_samples: int) -> list[ScheduledMode]:
-    """Returns the events in the order of time; raises InputError if two overlap or touch, or one extends beyond the series."""
-    ordered = sorted(schedule, key=lambda event: event.begin)
-    for before, after in itertools.pairwise(ordered):
-        if after.begin <= before.end:
-            raise InputError(
-                f"Expected events with nominal samples between them. Received: {before.mode} until sample {before.end} and {after.mode} from "
-                f"sample {after.begin}. Move one."
-            )
-    if ordered and ordered[-1].end > num_samples:
-        raise InputError(
-            f"Expected events within {num_samples:,} samples. Received: {ordered[-1].mode} until sample {ordered[-1].end}. Move or shorten it."
-        )
-    return ordered

@@ -14,9 +14,10 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.inject_options import InjectOptions, checked_place
 from enhsim_tf.datasets.label_columns import series_table
 from enhsim_tf.datasets.places import draw_between, length_limits
-from enhsim_tf.detection.anomalies import Anomaly, draw_begin, estimate_noise_sd, inject_anomalies
+from enhsim_tf.detection.anomalies import estimate_noise_sd, inject_anomalies
 from enhsim_tf.simulator.joint import telemetry_of
 from enhsim_tf.telemetry.pandas_series import index_of
+from enhsim_tf.telemetry.placing import PlacedEvent, draw_begin, place_events
 from enhsim_tf.telemetry.series import Telemetry
 
 
@@ -29,7 +30,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.Dat
 
     Returns:
         A data frame with the index of `sources.to_series` and the columns `value` and `label_columns.LABELS`. `frame.attrs` holds
-        `noise_sd`, and `anomalies`, a list of `anomalies.Anomaly` in the order of time. Samples that are not marked keep the value
+        `noise_sd`, and `anomalies`, a list of `placing.PlacedEvent` in the order of time. Samples that are not marked keep the value
         of the telemetry.
 
     Raises:
@@ -53,7 +54,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.Dat
     given = []
     for place in map(checked_place, options.at):
         severity = draw_between(options.severity, rng) if place.severity is None else place.severity
-        given.append(Anomaly(place.kind, severity, *place.samples(index, interval_s)))
+        given.append(PlacedEvent(place.kind, severity, *place.samples(index, interval_s)))
     gap = max([length for *_, length in drawn], default=0)
     changed, mask, anomalies = inject_anomalies(values, given, drawn, noise_sd, gap, rng)
     events = [(each.kind, each.severity, each.begin, each.end) for each in anomalies]
@@ -94,19 +95,24 @@ def inject_joint(telemetry: Recording, options: InjectOptions) -> pd.DataFrame:
     edges = np.cumsum([0, *map(len, telemetry.parts)]).tolist()
     bounds, nominal = list(zip(edges[:-1], edges[1:], strict=True)), values.copy()
     noise_sd = np.array([estimate_noise_sd([part.values[:, channel] for part in telemetry.parts]) for channel in range(values.shape[1])])
-    drawn = [(kinds[each % len(kinds)], int(rng.integers(shortest, longest + 1))) for each in range(options.number or len(kinds))]
+    drawn = [(kinds[each % len(kinds)], 1.0, int(rng.integers(shortest, longest + 1))) for each in range(options.number or len(kinds))]
     found: list[tuple[str, float, int, int, str]] = []
-    for kind, length in sorted(drawn, key=lambda each: -each[1]):
-        taken = [(begin, end) for _, _, begin, end, _ in found]
-        begin = draw_begin(bounds, taken, length, longest, rng)
-        is_common, here = kind == "common_shift", slice(begin, begin + length)
+
+    def changes(event: PlacedEvent) -> bool:
+        """Puts an anomaly into the series; whether it has changed a sample."""
+        is_common, here = event.kind == "common_shift", slice(event.begin, event.end)
         degree = draw_between(options.severity, rng) if is_common else 1.0
         channel = int(rng.integers(values.shape[1]))
         if is_common:
             values[here] += (degree * noise_sd).astype(np.float32)
         else:
-            values[here, channel] = _changed(nominal, kind, here, channel, bounds, rng)
-        found.append((kind, degree, begin, begin + length, "all" if is_common else telemetry.columns[channel]))
+            values[here, channel] = _changed(nominal, event.kind, here, channel, bounds, rng)
+        is_changed = bool((values[here] != nominal[here]).any())
+        if is_changed:
+            found.append((event.kind, degree, event.begin, event.end, "all" if is_common else telemetry.columns[channel]))
+        return is_changed
+
+    place_events([], drawn, bounds, longest, changes, rng)
     found.sort(key=lambda each: each[2])
     index = index_of(telemetry_of(telemetry))
     frame = series_table(values, values != nominal, telemetry.columns, [each[:4] for each in found], index)

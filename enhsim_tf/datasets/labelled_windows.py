@@ -8,14 +8,13 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
-from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import make_folder, replace_file
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import parquet_options, series_table, window_schema, window_table
 from enhsim_tf.datasets.places import Share, parse_start
-from enhsim_tf.detection.anomalies import TRIES, draw_begin
 from enhsim_tf.simulator.changes import fade_length
 from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.placing import PlacedEvent, in_order, place_events
 
 
 def write_windows_labelled(path: str | os.PathLike, simulator: EnhancedSimulator, shares: Sequence[Share]) -> dict[Degraded, int]:
@@ -55,7 +54,7 @@ def series_labelled(
     scenario: Degraded | None = None,
     seed: int = 0,
     start: str | pd.Timestamp | None = None,
-    schedule: Sequence[ScheduledMode] = (),
+    schedule: Sequence[PlacedEvent] = (),
 ) -> pd.DataFrame:
     """Generates one continuous series with labels. Samples that equal those of the nominal series are labelled nominal.
 
@@ -85,17 +84,16 @@ def series_labelled(
 def draw_schedule(
     simulator: EnhancedSimulator,
     num_samples: int,
-    given: Sequence[ScheduledMode],
+    given: Sequence[PlacedEvent],
     modes: Sequence[Degraded],
     number: int,
     lengths: tuple[int, int],
     rng: np.random.Generator,
-) -> list[ScheduledMode]:
+) -> list[PlacedEvent]:
     """Adds events at drawn places to those at given places, in the order of time.
 
-    The modes are used in turn. The longest events are placed first, each uniformly among all places that are free and at least the
-    greatest length away from other events. A place where the mode would not change the coarse run is drawn again: for example, `stuck`
-    changes nothing while the mechanism stands still.
+    The modes are used in turn, and events are at least the greatest length apart. They are placed by `placing.place_events`: `stuck`, for
+    example, changes nothing while the mechanism stands still.
 
     Args:
         simulator: The simulator, whose series begins at time 0.
@@ -108,22 +106,13 @@ def draw_schedule(
     """
     if simulator.is_run_model:
         simulator.alignment.draw(np.zeros(0, int), [*modes, *given], rng)  # refuses them
-    schedule = check_schedule(given, num_samples)
+    given = in_order(given, [(0, num_samples)], gap=1)
     gap = max(2 * fade_length(simulator.window) + 1, lengths[1])  # changes that fade do not meet
     drawn = [(modes[each % len(modes)], int(rng.integers(lengths[0], lengths[1] + 1))) for each in range(number)]
-    for mode, length in sorted(drawn, key=lambda each: -each[1]):
-        taken = [(event.begin, event.end) for event in schedule]
-        for _ in range(TRIES):
-            event = ScheduledMode(mode.mode, mode.severity, draw_begin([(0, num_samples)], taken, length, gap, rng), length)
-            times = simulator.interval_s * np.arange(event.begin, event.end)[None]
-            scenario = Degraded(mode.mode, mode.severity, 0.0)
-            waves = simulator.alignment.simulators
-            if any((each.simulate(times, scenario, np.random.default_rng(0)) != each.simulate(times)).any() for each in waves):
-                break
-        else:
-            raise InputError(
-                f"Expected a place where the mode changes the coarse run. Received: {mode.mode} at {mode.severity:g} over {length} samples, "
-                f"which changes nothing at {TRIES} drawn places. Give it a higher severity or a greater length."
-            )
-        schedule.append(event)
-    return sorted(schedule, key=lambda event: event.begin)
+
+    def changes(event: PlacedEvent) -> bool:
+        times, scenario = simulator.interval_s * np.arange(event.begin, event.end)[None], Degraded(event.kind, event.severity, 0.0)
+        waves = simulator.alignment.simulators
+        return any((each.simulate(times, scenario, np.random.default_rng(0)) != each.simulate(times)).any() for each in waves)
+
+    return place_events(given, [(mode.mode, mode.severity, length) for mode, length in drawn], [(0, num_samples)], gap, changes, rng)

@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.placing import PlacedEvent, in_order, place_events
 
 SEVERITIES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the experiments, in units of the standard deviation of the noise
 DURATIONS = (25, 100, 250)  # of the experiments, in samples
 SPIKE_INTERVAL = 25  # number of samples from one spike of an anomaly to the next
 OSCILLATION_PERIOD = 20  # in samples; shorter than the shortest duration, and much shorter than the periods of the telemetry
-TRIES = 100  # drawn places of an anomaly, before the series is said to have no place where it changes a sample
 _NORMAL_MAD = 1.482602218505602  # standard deviation of a normal distribution, in units of its median absolute deviation
 
 
@@ -131,30 +131,6 @@ def put_anomalies(
     return anomalous, mask
 
 
-@dataclasses.dataclass(frozen=True)
-class Anomaly:
-    """An anomaly at a place in a series.
-
-    Raises:
-        InputError: If the kind is unknown or a number is out of range.
-    """
-
-    kind: str  # a key of `INJECTIONS`
-    severity: float  # in units of the standard deviation of the noise; it may be infinite for `stuck`
-    begin: int  # first sample
-    length: int  # number of samples
-
-    def __post_init__(self):
-        check_kind(self.kind, self.severity)
-        if self.begin < 0 or self.length < 1:
-            raise InputError(f"Expected an anomaly of at least one sample, from sample 0 on. Received: {self}.")
-
-    @property
-    def end(self) -> int:
-        """First sample after the anomaly."""
-        return self.begin + self.length
-
-
 def estimate_noise_sd(parts: Sequence[np.ndarray]) -> float:
     """Estimates the standard deviation of the noise of a smooth signal from its second differences.
 
@@ -172,20 +148,19 @@ def estimate_noise_sd(parts: Sequence[np.ndarray]) -> float:
 
 def inject_anomalies(
     parts: Sequence[np.ndarray],
-    given: Sequence[Anomaly],
+    given: Sequence[PlacedEvent],
     drawn: Sequence[tuple[str, float, int]],
     noise_sd: float,
     gap: int,
     rng: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray, list[Anomaly]]:
+) -> tuple[np.ndarray, np.ndarray, list[PlacedEvent]]:
     """Injects anomalies into a series. They do not overlap, and none extends over a gap of the series.
 
-    Drawn anomalies are placed one after the other, the longest first, each uniformly among all places that are free. A place where the
-    anomaly would change no sample is drawn again: for example, `stuck` changes nothing where the telemetry is constant.
+    Drawn anomalies are placed by `placing.place_events`: `stuck`, for example, changes nothing where the telemetry is constant.
 
     Args:
         parts: The nominal series, or the parts between its gaps, each of shape `(samples,)`.
-        given: Anomalies at given places. Samples are counted over all parts.
+        given: Anomalies at given places, with severities in units of `noise_sd`. Samples are counted over all parts.
         drawn: Kind, severity and length of each anomaly whose place is drawn.
         noise_sd: Standard deviation of the noise, in the unit of the series.
         gap: Least number of samples between a drawn anomaly and any other.
@@ -201,87 +176,30 @@ def inject_anomalies(
     bounds = list(itertools.pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
     nominal = np.concatenate([np.asarray(part, np.float32) for part in parts])
     values = nominal.copy()
-    taken: list[tuple[int, int]] = []
-    found: list[Anomaly] = []
+    found: list[PlacedEvent] = []
 
-    def put(anomaly: Anomaly) -> bool:
-        """Whether an anomaly changes the series; then it is kept."""
-        changed = _put_one(values, nominal, anomaly, bounds, noise_sd, rng)
-        if changed is not None:
-            taken.append((anomaly.begin, anomaly.end))
-            found.append(changed)
-        return changed is not None
+    def changes(event: PlacedEvent) -> bool:
+        """Puts an anomaly into the series; whether it has changed a sample."""
+        check_kind(event.kind, event.severity)
+        start, stop = next(each for each in bounds if each[0] <= event.begin < each[1])
+        here, columns = slice(event.begin, event.end), np.arange(event.begin - start, event.end - start)[None]
+        with np.errstate(over="ignore"):
+            changed, _ = put_anomalies(
+                nominal[None, start:stop], np.zeros((1, 1), int), columns, event.kind, event.severity * noise_sd, rng
+            )
+        values[here] = changed[0, columns[0]]
+        if not np.isfinite(values[here]).all():
+            raise InputError(f"Expected anomalies within the range of float32. Received: {event}. Choose a lower severity.")
+        places = np.flatnonzero(values[here] != nominal[here])
+        if len(places):
+            found.append(dataclasses.replace(event, begin=event.begin + int(places[0]), length=int(places[-1] - places[0]) + 1))
+        return len(places) > 0
 
-    for anomaly in sorted(given, key=lambda each: each.begin):
-        _check_place(anomaly, bounds, taken)
-        if not put(anomaly):
+    for event in in_order(given, bounds):
+        if not changes(event):
             raise InputError(
-                f"Expected an anomaly that changes the telemetry. Received: {_text(anomaly)}, which changes no sample. "
+                f"Expected an anomaly that changes the telemetry. Received: {event}, which changes no sample. "
                 "Choose another place, a longer one or a higher severity."
             )
-    for kind, severity, length in sorted(drawn, key=lambda each: -each[2]):
-        if not any(put(Anomaly(kind, severity, draw_begin(bounds, taken, length, gap, rng), length)) for _ in range(TRIES)):
-            raise InputError(
-                f"Expected a place where the anomaly changes a sample. Received: {kind} at {severity:g} sd over {length} samples, which changes "
-                f"none at {TRIES} drawn places. Leave it out, or give it a higher severity or a greater length."
-            )
+    place_events(given, drawn, bounds, gap, changes, rng)
     return values, values != nominal, sorted(found, key=lambda each: each.begin)
-
-
-def _put_one(
-    values: np.ndarray, nominal: np.ndarray, anomaly: Anomaly, bounds: Sequence[tuple[int, int]], noise_sd: float, rng: np.random.Generator
-) -> Anomaly | None:
-    """Changes the samples of an anomaly and returns the anomaly as it is, or None if no sample has changed."""
-    start, stop = next(each for each in bounds if each[0] <= anomaly.begin < each[1])
-    here, nominal_here = slice(anomaly.begin, anomaly.end), nominal[anomaly.begin : anomaly.end]
-    columns = np.arange(anomaly.begin - start, anomaly.end - start)[None]
-    with np.errstate(over="ignore"):
-        changed, _ = put_anomalies(
-            nominal[None, start:stop], np.zeros((1, 1), int), columns, anomaly.kind, anomaly.severity * noise_sd, rng
-        )
-    values[here] = changed[0, columns[0]]
-    if not np.isfinite(values[here]).all():
-        raise InputError(f"Expected anomalies within the range of float32. Received: {_text(anomaly)}. Choose a lower severity.")
-    places = np.flatnonzero(values[here] != nominal_here)
-    if not len(places):
-        return None
-    return dataclasses.replace(anomaly, begin=anomaly.begin + int(places[0]), length=int(places[-1] - places[0]) + 1)
-
-
-def draw_begin(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]], length: int, gap: int, rng: np.random.Generator) -> int:
-    """Draws the first sample of an event of this length uniformly from all samples at which it fits; raises InputError if there are none.
-
-    `bounds` are first sample and end of each part of the series, one of which holds the event, `taken` those of the events that are placed
-    already, and `gap` is the least number of samples between two events.
-    """
-    places = [np.zeros(0, np.int64)]
-    for start, stop in bounds:
-        begin = start
-        for first, end in [*sorted(each for each in taken if start <= each[0] < stop), (stop + gap, stop)]:
-            places.append(np.arange(begin, first - gap - length + 1))
-            begin = end + gap
-    free = np.concatenate(places)
-    if not len(free):
-        raise InputError(
-            f"Expected room for events that do not overlap. Received: {bounds[-1][1]:,} samples, in which {len(taken)} events are placed and "
-            f"{length} samples with a gap of {gap} on each side are nowhere free. Ask for fewer or shorter ones."
-        )
-    return int(free[rng.integers(len(free))])
-
-
-def _check_place(anomaly: Anomaly, bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]]) -> None:
-    """Checks that an anomaly lies within one part and overlaps no other."""
-    if not any(start <= anomaly.begin and anomaly.end <= stop for start, stop in bounds):
-        raise InputError(
-            f"Expected an anomaly within a part of the telemetry, of {len(bounds)} parts with {bounds[-1][1]:,} samples. "
-            f"Received: {_text(anomaly)}. Choose a place that no gap and no end cuts."
-        )
-    for first, end in taken:
-        if anomaly.begin < end and first < anomaly.end:
-            raise InputError(
-                f"Expected anomalies that do not overlap. Received: {_text(anomaly)}, and another from sample {first} to {end}. Move one."
-            )
-
-
-def _text(anomaly: Anomaly) -> str:
-    return f"{anomaly.kind} at {anomaly.severity:g} sd from sample {anomaly.begin} to {anomaly.end}"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.commands import CommandTraces
-from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.recording import Recording, record
 from enhsim_tf.common.errors import InputError
@@ -23,6 +23,7 @@ from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length,
 from enhsim_tf.simulator.joint import cut, rounded, windows_of
 from enhsim_tf.simulator.model_folder import read_saved, write_saved
 from enhsim_tf.simulator.packing import packed, unpacked
+from enhsim_tf.telemetry.placing import PlacedEvent, in_order
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
@@ -253,7 +254,7 @@ class EnhancedSimulator:
         return self.generate_labelled_series(num_samples, scenario, seed)[0]
 
     def generate_labelled_series(
-        self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, schedule: Sequence[ScheduledMode] = ()
+        self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, schedule: Sequence[PlacedEvent] = ()
     ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
         """Generates one continuous series of any length without visible joins, with a mask of what a degraded mode has changed.
 
@@ -274,12 +275,12 @@ class EnhancedSimulator:
         _check_count("num_samples", num_samples, 1)
         if scenario is not None and schedule:
             raise InputError("Expected a scenario or a schedule. Received: both. Put the scenario into the schedule.")
-        schedule, noise_rng = check_schedule(schedule, num_samples), np.random.default_rng([seed, 1])
+        schedule, noise_rng = in_order(schedule, [(0, num_samples)], gap=1), np.random.default_rng([seed, 1])
         if self.is_run_model:
             self.alignment.draw(np.zeros(0, int), [scenario, *schedule], noise_rng)  # refuses them
             clean = self.nominal_series(num_samples)
             return self.add_noise(clean, noise_rng), np.zeros(clean.shape, bool), []
-        events = [(Degraded(each.mode, each.severity, 0.0), each.begin, each.end) for each in schedule]
+        events = [(Degraded(each.kind, each.severity, 0.0), each.begin, each.end) for each in schedule]
         events += [] if scenario is None else [(scenario, 0, num_samples)]
         window, hop = self.window, self.window // 2
         num_windows = 1 + max(0, -(-(num_samples - window) // hop))  # that overlap by half and cover the series

@@ -5,11 +5,12 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, ScheduledMode
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.label_columns import LABELS
 from enhsim_tf.datasets.labelled_windows import series_labelled, write_windows_labelled
 from enhsim_tf.datasets.places import Share, divide_windows
+from enhsim_tf.telemetry.placing import PlacedEvent
 from tests.known_simulators import of_waves
 
 WINDOW = 60
@@ -139,10 +140,10 @@ def test_a_series_equals_that_of_the_simulator(scenario):
 def test_wrong_schedules_are_refused(refused):
     for begin, length in ((200, 50), (150, 10), (950, 51)):  # touching, overlapping, beyond the end
         with refused("drift"):
-            series_labelled(known(), 1_000, schedule=[ScheduledMode("stuck", 1.0, 100, 100), ScheduledMode("drift", 1.0, begin, length)])
+            series_labelled(known(), 1_000, schedule=[PlacedEvent("stuck", 1.0, 100, 100), PlacedEvent("drift", 1.0, begin, length)])
     for wrong in (("rust", 1.0, 0, 5), ("stuck", 2.0, 0, 5), ("stuck", 1.0, -1, 5), ("stuck", 1.0, 0, 0)):
         with refused():
-            ScheduledMode(*wrong)
+            series_labelled(known(), 1_000, schedule=[PlacedEvent(*wrong)])
 
 
 def test_a_series_with_a_start_has_times():

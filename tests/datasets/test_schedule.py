@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.datasets.labelled_windows import draw_schedule
 from enhsim_tf.datasets.places import (
     Place,
@@ -18,6 +18,7 @@ from enhsim_tf.datasets.places import (
     parse_start,
     split_limits,
 )
+from enhsim_tf.telemetry.placing import PlacedEvent
 from tests.known_simulators import of_waves
 from tests.small_data_set import COARSE, INTERVAL_S
 
@@ -27,19 +28,19 @@ SIMULATOR = of_waves([COARSE], 64, interval_s=INTERVAL_S)
 
 @pytest.mark.parametrize("seed", range(10))
 def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
-    given, rng = [ScheduledMode("gain_loss", 1.0, 500, 100)], np.random.default_rng(seed)
+    given, rng = [PlacedEvent("gain_loss", 1.0, 500, 100)], np.random.default_rng(seed)
     schedule = draw_schedule(SIMULATOR, 3_000, given, MODES, 8, (10, 80), rng)
-    assert sorted(event.mode for event in schedule) == ["drift"] * 4 + ["gain_loss"] + ["stuck"] * 4 and given[0] in schedule
+    assert sorted(event.kind for event in schedule) == ["drift"] * 4 + ["gain_loss"] + ["stuck"] * 4 and given[0] in schedule
     for before, after in itertools.pairwise(schedule):
         assert after.begin - before.end >= 80
     assert schedule[-1].end <= 3_000 and all(10 <= event.length <= 80 for event in schedule if event not in given)
-    events = [(Degraded(event.mode, event.severity, 0.0), event.begin, event.end) for event in schedule]
+    events = [(Degraded(event.kind, event.severity, 0.0), event.begin, event.end) for event in schedule]
     drawn = SIMULATOR.alignment.draw_series(3_000, events, np.random.default_rng(0))
     run, nominal = drawn.coarse[0, :, 0], drawn.nominal[0, :, 0]
     for event in schedule:
         assert (run[event.begin : event.end] != nominal[event.begin : event.end]).any()
         nominal[event.begin : event.end] = run[event.begin : event.end]
-        if event.mode == "stuck":
+        if event.kind == "stuck":
             assert len(set(run[event.begin : event.end])) == 1  # until the end
     np.testing.assert_array_equal(run, nominal)
 

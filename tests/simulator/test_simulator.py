@@ -4,13 +4,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.interface import FunctionSimulator
 from enhsim_tf.coarse_simulator.recording import Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator import simulator as module
 from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.placing import PlacedEvent
 from tests.known_simulators import of_waves
 from tests.simulator.conftest import WINDOW, coarse_run, smooth_wave
 
@@ -38,7 +39,7 @@ def test_a_series_has_no_seams(single):
     assert steps.max() < 2 * 2 / 9 + 6 * np.sqrt(2) * 0.1  # the steepest flank, and six standard deviations of two noises
 
 
-SCHEDULE = [ScheduledMode("drift", 1.0, 300, 200), ScheduledMode("gain_loss", 1.0, 900, 100)]
+SCHEDULE = [PlacedEvent("drift", 1.0, 300, 200), PlacedEvent("gain_loss", 1.0, 900, 100)]
 
 
 def test_events_of_a_series_are_where_the_mask_is(single):
@@ -46,7 +47,7 @@ def test_events_of_a_series_are_where_the_mask_is(single):
     nominal, fade = single[0].generate_series(1_500, seed=0), WINDOW // 16
     np.testing.assert_array_equal(values[~mask], nominal[~mask])
     for event, (mode, severity, begin, end) in zip(SCHEDULE, events, strict=True):
-        assert (mode, severity) == (event.mode, 1.0) and event.begin - fade <= begin < end <= event.end + fade
+        assert (mode, severity) == (event.kind, 1.0) and event.begin - fade <= begin < end <= event.end + fade
     assert not mask[550:850].any()
 
 
