@@ -1,12 +1,8 @@
 """Degraded modes of the coarse simulator (sections 1 and 3 of the paper)."""
 
 import dataclasses
-from collections.abc import Callable
-
-import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.paper import degraded
 from enhsim_tf.paper.degraded import MODES
 
 
@@ -41,36 +37,12 @@ class Degraded:
 
     def first_sample(self, num_samples: int) -> int:
         """Sample at which the degradation of a window or series of this length starts."""
-        return int(round(self.onset * num_samples, 6))  # rounded first, since 0.29 * 100 is 28.999999999999996
-
-
-def degrade(
-    signal: Callable[[np.ndarray], np.ndarray],
-    time_s: np.ndarray,
-    scenario: Degraded | None,
-    levels: tuple[float, float],
-    shortest_period_s: float,
-    rng: np.random.Generator,
-) -> np.ndarray:
-    """Applies a degraded mode to a signal; signals are degraded alike by the same scenario and state of `rng`.
-
-    Args:
-        signal: The nominal signal, a function from times in seconds to values of the same shape.
-        time_s: Times in seconds, shape `(windows, samples)`, as the result.
-        scenario: The degraded mode, or None for the nominal signal.
-        levels: Lowest and highest nominal level.
-        shortest_period_s: Shortest period of the signal in seconds.
-        rng: Random number generator for the lags of `friction` and the gaps of `dropout`.
-    """
-    if scenario is None or scenario.severity == 0:
-        return signal(time_s)
-    onset = min(scenario.first_sample(time_s.shape[1]), time_s.shape[1] - 1)
-    return degraded.degrade(signal, time_s, scenario.mode, scenario.severity, levels, shortest_period_s, rng, onset)
+        return min(int(round(self.onset * num_samples, 6)), num_samples - 1)  # rounded first, since 0.29 * 100 is 28.999999999999996
 
 
 def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int] | None:
     """Returns the first sample and the end at which a stuck mechanism stands still in a window or series; None if it is not stuck."""
     if scenario is None or scenario.mode != "stuck" or scenario.severity == 0:
         return None
-    begin = min(scenario.first_sample(num_samples), num_samples - 1)
+    begin = scenario.first_sample(num_samples)
     return begin, begin + int(round(scenario.severity * (num_samples - 1 - begin), 6)) + 1

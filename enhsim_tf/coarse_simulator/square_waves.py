@@ -9,8 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded, degrade
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.paper.degraded import degrade
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry
 
 _NUM_BINS = 200  # bins of a folded period
@@ -91,8 +92,12 @@ class SquareWaveSimulator:
 
     def simulate(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
         """Simulates windows, float32 of shape `(windows, samples)`; the generator, None: one with seed 0, is for `friction` and `dropout`."""
-        rng = np.random.default_rng(0) if rng is None else rng
-        return degrade(self, np.asarray(time_s, np.float64), scenario, self.levels, self.shortest_period_s, rng).astype(np.float32)
+        time_s = np.asarray(time_s, np.float64)
+        if scenario is None or scenario.severity == 0:
+            return self(time_s).astype(np.float32)
+        rng, onset = np.random.default_rng(0) if rng is None else rng, scenario.first_sample(time_s.shape[1])
+        found = degrade(self, time_s, scenario.mode, scenario.severity, self.levels, self.shortest_period_s, rng, onset)
+        return found.astype(np.float32)
 
     def run(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
         """Simulates one run, float32 of shape `(samples, 1)`, see `interface.CoarseSimulator.run`."""

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.enhancer.candidates import fit_enhancer
 from enhsim_tf.enhancer.names import RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
+from enhsim_tf.paper.degraded import MODES, degrade
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
@@ -80,7 +81,10 @@ class DegradedModes:
         times = chosen.interval * (begins[:, None] + np.arange(chosen.window, dtype=np.float64))
         size, shortest = chosen.orbit_amplitude + chosen.rotation_amplitude, min(chosen.orbit_period, chosen.rotation_period)
         coarse = self.example.coarse.simulate(times, scenario, np.random.default_rng(chance + 1))
-        truth = degrade(self.example.truth, times, scenario, (-size, size), shortest, np.random.default_rng(chance + 1))
+        if scenario is None:
+            return coarse, self.example.truth(times).astype(np.float32)
+        how = scenario.mode, scenario.severity, (-size, size), shortest, np.random.default_rng(chance + 1)
+        truth = degrade(self.example.truth, times, *how, scenario.first_sample(chosen.window))
         return coarse, truth.astype(np.float32)
 
     def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
+from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, fit_box, level_offset_and_scale
+from enhsim_tf.paper import degraded as of_paper
+from enhsim_tf.paper.degraded import MODES
 from enhsim_tf.telemetry.series import Telemetry
 
 TWO = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)])
@@ -91,9 +93,15 @@ def test_box_finds_the_fundamental_under_a_stronger_harmonic():
 # degraded modes
 
 
+def degrade(signal, times, scenario, levels, rng=0):
+    """Degrades a signal whose shortest period is 40 s, as the coarse simulator is degraded."""
+    onset = scenario.first_sample(times.shape[1])
+    return of_paper.degrade(signal, times, scenario.mode, scenario.severity, levels, 40.0, np.random.default_rng(rng), onset)
+
+
 def by_time(mode, severity, onset=0.25, rng=0):
     """Degrades a signal that returns the time itself, which shows how the mode changes the mechanism's time."""
-    return degrade(lambda time: time.copy(), TIMES, Degraded(mode, severity, onset), (-1.0, 3.0), 40.0, np.random.default_rng(rng))
+    return degrade(lambda time: time.copy(), TIMES, Degraded(mode, severity, onset), (-1.0, 3.0), rng)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -113,7 +121,7 @@ def test_nominal_to_the_bit_before_the_onset_and_not_after(mode):
 @pytest.mark.parametrize("onset", [0.0, 0.29, 0.57])
 def test_onset_is_the_sample_asked_for(onset):
     times = np.arange(100.0)[None]
-    values = degrade(lambda time: 5 + 0 * time, times, Degraded("gain_loss", 1.0, onset), (0.0, 2.0), 40.0, np.random.default_rng(0))
+    values = degrade(lambda time: 5 + 0 * time, times, Degraded("gain_loss", 1.0, onset), (0.0, 2.0))
     assert np.argmax(values[0] != 5) == round(100 * onset)
 
 
@@ -141,7 +149,7 @@ def test_dropout_reads_the_lowest_level_in_runs_of_ten():
     times = np.arange(10_000.0) + np.zeros((4, 1))
     for severity in (0.2, 1.0):
         scenario = Degraded("dropout", severity, onset=0)
-        lost = degrade(lambda time: time + 1, times, scenario, (-1.0, 3.0), 40.0, np.random.default_rng(0)) == -1
+        lost = degrade(lambda time: time + 1, times, scenario, (-1.0, 3.0)) == -1
         runs = lost.reshape(4, 1_000, 10)
         assert (runs.all(axis=2) | ~runs.any(axis=2)).all()
         share = severity / 2
