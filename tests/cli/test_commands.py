@@ -1,5 +1,6 @@
 """End-to-end tests of the commands, and their error messages for invalid input."""
 
+import argparse
 import json
 import os
 import re
@@ -15,13 +16,12 @@ import pytest
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
+from enhsim_tf.cli import fit
 from enhsim_tf.cli.arguments import parse
 from enhsim_tf.cli.checks import cleaning_options
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.simulator import fit_many
 from enhsim_tf.simulator.model_folder import channels_of, models_of
-from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.known_simulators import of_waves
@@ -348,8 +348,8 @@ def test_a_fit_that_fails_says_it_once_and_leaves_no_new_folder(told, tmp_path):
 
 
 def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
-    monkeypatch.setattr(fit_many, "_cleaned", lambda *arguments: {}["defect"])
-    outcome = fit_many.fit_or_say(fit_many.Job({"volts": None}, Path("x"), FitOptions(), Cleaning()))
+    monkeypatch.setattr(fit, "_cleaned", lambda *arguments: {}["defect"])
+    outcome = fit.fit_or_say({"volts": None}, Path("x"), argparse.Namespace(cleaning=Cleaning()), None, None)
     line = outcome.failed["volts"]
     assert not outcome.reports and len(line.splitlines()) == 1 and "KeyError" in line and "'defect'" in line
 

@@ -1,11 +1,11 @@
+import argparse
 import hashlib
 
 import numpy as np
 import pandas as pd
 
+from enhsim_tf.cli import fit
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from enhsim_tf.simulator import fit_many
-from enhsim_tf.simulator.fit_many import fit_channels
 from enhsim_tf.simulator.model_folder import channels_of, models_of, name_of_channels
 from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
@@ -21,9 +21,10 @@ def table(**more):
     return {name: pd.Series(each, times, name=name) for name, each in columns.items()}
 
 
-def fitted(tmp_path, columns, **options):
-    lines = []
-    return (*fit_channels(columns, tmp_path / "models", OPTIONS, Cleaning(), lines.append, **options), lines)
+def fitted(tmp_path, columns, separately=False, workers=None):
+    lines, chosen = [], {"chosen": OPTIONS, "cleaning": Cleaning(), "engine": "local", "json": True}
+    options = argparse.Namespace(out=tmp_path / "models", separately=separately, workers=workers, **chosen)
+    return (*fit.fit_channels(columns, options, lines.append), lines)
 
 
 def test_all_channels_become_one_simulator_and_one_that_cannot_is_left_out(tmp_path):
@@ -64,14 +65,15 @@ def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
 def test_a_channel_that_kills_its_worker_is_reported_and_stops_no_other(tmp_path, monkeypatch):
     tried = []
 
-    def run(engine, work, jobs, workers):
-        tried.append(([job.name for job in jobs], workers))
-        for place, job in enumerate(jobs):
-            if job.name == "bad":
-                raise ProcessesDiedError(jobs[place : place + 2])
-            yield fit_many.Outcome(job.name, lines=[job.name])
+    def run(engine, work, groups, workers):
+        names = [name for (name,) in groups]
+        tried.append((names, workers))
+        for place, name in enumerate(names):
+            if name == "bad":
+                raise ProcessesDiedError(groups[place : place + 2])
+            yield fit.Outcome(name, lines=[name])
 
-    monkeypatch.setattr(fit_many.engines, "run", run)
+    monkeypatch.setattr(fit.engines, "run", run)
     _, failed, lines = fitted(tmp_path, dict.fromkeys(["a", "bad", "c", "d"]), separately=True, workers=4)
     assert list(failed) == ["bad"] and "memory" in failed["bad"] and lines == ["a", "c", "d"]
     assert tried == [(["a", "bad", "c", "d"], 4), (["c"], 1), (["bad"], 1), (["d"], 4)]
