@@ -1,10 +1,8 @@
 """The command: runs the pipeline of the paper, draws its figures, and gives a verdict on each of its claims."""
 
 import argparse
-import dataclasses
 import sys
 import time
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +13,6 @@ from enhsim_tf.common.stages import Stages, default_cache
 
 if TYPE_CHECKING:
     from enhsim_tf.paper.settings import Settings
-    from enhsim_tf.paper.telemetry import Telemetry
 
 PROGRAM = "python -m enhsim_tf.reproduce"
 EXAMPLES = f"""\
@@ -76,44 +73,17 @@ def choose_folder(options: argparse.Namespace) -> Path:
     return options.out or Path(default)
 
 
-class InfluxTelemetry:
-    """The paper's store: a measurement in InfluxDB 2, through the tool's client. The place is that of the option `--store`."""
-
-    def __init__(self, place: str):
-        from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
-
-        if place != "influxdb" and not place.startswith("influxdb://"):
-            raise InputError(f"Expected --store parquet, influxdb or influxdb://bucket/measurement/field. Received: --store {place}.")
-        self.location = parse_location("influxdb://telemetry/enhsim_tf/value" if place == "influxdb" else place)
-        self.store = InfluxStore(self.location)
-        self.store.check()
-
-    def write(self, telemetry: "Telemetry") -> None:
-        """Places a series, tagged by its content, unless it is there."""
-        from enhsim_tf.telemetry.influx_store import InfluxStore
-        from enhsim_tf.telemetry.series import Telemetry as Series
-
-        content = f"{zlib.crc32(telemetry.values.tobytes()):08x}"
-        self.store = InfluxStore(dataclasses.replace(self.location, tags=(*self.location.tags, ("run", content))))
-        if telemetry.name not in self.store.names():
-            start = telemetry.start.replace("Z", "+00:00")
-            self.store.write(Series(telemetry.values, telemetry.interval, start=start, name=telemetry.name))
-
-    def read(self) -> "Telemetry":
-        """Reads the series back."""
-        from enhsim_tf.paper.telemetry import Telemetry
-
-        series = self.store.read(self.store.names()[0])
-        return Telemetry(series.values, series.interval_s, series.start.replace("+00:00", "Z"), series.name)
-
-
 def run(options: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
     began = time.perf_counter()
     if options.telemetry is None and (options.column or options.time):
         raise InputError("Expected --column and --time together with --telemetry. Received: one of them alone.")
     settings, folder = read_settings(options), choose_folder(options)
-    store = None if options.store == "parquet" else InfluxTelemetry(options.store)
+    store = None
+    if options.store != "parquet":
+        from enhsim_tf.own_store import InfluxTelemetry
+
+        store = InfluxTelemetry(options.store)
     folder, cache = make_folder(folder), make_folder(options.cache or default_cache())
     remove_leftovers(folder)
 
