@@ -4,6 +4,7 @@ Most kinds of anomaly change one channel. Those of `JOINT_KINDS` need several: t
 how channels move together, and one is a fault that acts on all of them.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -92,8 +93,7 @@ def inject_joint(telemetry: Recording, options: InjectOptions) -> pd.DataFrame:
         raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
     rng, (shortest, longest) = np.random.default_rng([options.seed, 61]), length_limits(options.length, telemetry.interval_s)
     values = telemetry.values.astype(np.float32)
-    edges = np.cumsum([0, *map(len, telemetry.parts)]).tolist()
-    bounds, nominal = list(zip(edges[:-1], edges[1:], strict=True)), values.copy()
+    bounds, nominal = list(itertools.pairwise(np.cumsum([0, *map(len, telemetry.parts)]).tolist())), values.copy()
     noise_sd = np.array([estimate_noise_sd([part.values[:, channel] for part in telemetry.parts]) for channel in range(values.shape[1])])
     drawn = [(kinds[each % len(kinds)], 1.0, int(rng.integers(shortest, longest + 1))) for each in range(options.number or len(kinds))]
     found: list[tuple[str, float, int, int, str]] = []

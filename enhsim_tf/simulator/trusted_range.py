@@ -53,9 +53,9 @@ class TrustedRange:
         scores = self.score(cut([np.asarray(coarse, np.float32)], starts, window))
         return average_windows(lambda rows: np.repeat(scores[rows, None, None], window, axis=1), starts, window, len(coarse))[:, 0]
 
-    def share_outside(self, scenario: Degraded | None, num_windows: int = 200, seed: int = 0) -> float:
-        """Returns the share of the windows of a scenario that are outside the training range; None is nominal."""
-        return float(np.mean(self.score(self._drawn(scenario, num_windows, 2 + seed)) > 1))
+    def share_outside(self, scenario: Degraded | None) -> float:
+        """Returns the share of 200 windows of a scenario that are outside the training range; None is nominal."""
+        return float(np.mean(self.score(self._drawn(scenario, 200, seed=2)) > 1))
 
     def _drawn(self, scenario: Degraded | None, num_windows: int, seed: int) -> np.ndarray:
         rng = np.random.default_rng([seed, 3])

@@ -163,3 +163,13 @@ def test_a_common_shift_has_the_severity_in_each_channel():
 def test_one_channel_is_refused(refused):
     with refused("several channels"):
         inject_joint(together(1), InjectOptions(["delay"]))
+
+
+def test_a_joint_anomaly_that_changes_nothing_is_drawn_again_or_refused(refused):
+    values = NOMINAL[:, :2].copy()
+    values[:, 1] = 7  # a constant channel that is late is as before
+    for seed in range(5):
+        frame = inject_joint(Recording((Run(values),), ("a", "b"), name="ab"), InjectOptions(["delay"], number=3, seed=seed))
+        assert {each[4] for each in frame.attrs["anomalies"]} == {"a"}
+    with refused("changes nothing at 100 drawn places"):
+        inject_joint(Recording((Run(np.ones((900, 2), np.float32)),), ("a", "b"), name="ab"), InjectOptions(["delay"]))
