@@ -254,8 +254,8 @@ assert sum(more > 0.01) == 5 and more.min() > -0.001
 
 # %% [markdown]
 # **Answer.** As a reference, on the battery. As a source it adds little to what the telemetry alone finds, for a detector that measures the
-# distance from a mean. The reference keeps to 1 % of false alarms from 300 known windows on; with 30, no use does. The source stays above
-# 1 % at every number.
+# distance from a mean. On the battery, the reference keeps to 1 % of false alarms from 300 known windows on; with 30, no use does, and the
+# source never does.
 #
 # On the aircraft, the reference finds 37 % and the telemetry alone 29 %. The intervals are wide because the kinds of faults differ. Kind by
 # kind, the reference finds more in five of six and as much in one, at 0.6 instead of 0.3 % of false alarms. On average, the enhanced run
