@@ -2,11 +2,13 @@
 
 import dataclasses
 import zlib
+from typing import TYPE_CHECKING
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.paper.telemetry import Telemetry
 from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
-from enhsim_tf.telemetry.series import Telemetry as Series
+
+if TYPE_CHECKING:
+    from enhsim_tf.paper.telemetry import Telemetry
 
 
 class InfluxTelemetry:
@@ -19,15 +21,19 @@ class InfluxTelemetry:
         self.store = InfluxStore(self.location)
         self.store.check()
 
-    def write(self, telemetry: Telemetry) -> None:
+    def write(self, telemetry: "Telemetry") -> None:
         """Places a series, tagged by its content, unless it is there."""
+        from enhsim_tf.telemetry.series import Telemetry as Series
+
         content = f"{zlib.crc32(telemetry.values.tobytes()):08x}"
         self.store = InfluxStore(dataclasses.replace(self.location, tags=(*self.location.tags, ("run", content))))
         if telemetry.name not in self.store.names():
             start = telemetry.start.replace("Z", "+00:00")
             self.store.write(Series(telemetry.values, telemetry.interval, start=start, name=telemetry.name))
 
-    def read(self) -> Telemetry:
+    def read(self) -> "Telemetry":
         """Reads the series back."""
+        from enhsim_tf.paper.telemetry import Telemetry
+
         series = self.store.read(self.store.names()[0])
         return Telemetry(series.values, series.interval_s, series.start.replace("+00:00", "Z"), series.name)
