@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.regular_grid import find_interval
 from enhsim_tf.telemetry.cleaning.report import KINDS, finding_from_dict, lines_of
 
@@ -201,6 +202,15 @@ def test_input_that_cannot_be_parsed_is_refused_with_its_place(refused, name):
     series, words = REFUSED[name]
     with refused(words):
         clean(series)
+
+
+@pytest.mark.parametrize(
+    ("cell", "number"),
+    [("1'234.5", 1234.5), ("1\u00a0234,5", 1234.5), ("12 345", 12345), ("+   1.5", 1.5), ("1.5D-01", 0.15), ("1234 5", None)],
+)
+def test_numbers_of_other_programs_by_hand(cell, number):
+    values, bad, _ = parse_numbers(pd.Series([cell, "2"]), "", drop=True)
+    assert (None if bad[0] else values[0]) == number and values[1] == 2
 
 
 def test_the_interval_is_that_of_the_long_run_before_a_jump_of_the_clock():

@@ -25,6 +25,7 @@ _COMMA_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+"
 _POINT_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+"
 _BOTH = rf"{_COMMA_THOUSANDS}\.\d*"  # 1,234.5 shows that commas separate thousands
 _WHOLE = r"[+-]?\d+"
+_GROUPED = r"[+-]?[1-9]\d{0,2}(?:['\u2019 \u00a0\u202f]\d{3})+(?:[.,]\d+)?"  # thousands apart by apostrophes or blanks
 _LARGEST = float(np.finfo(np.float32).max)
 
 
@@ -154,6 +155,7 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarr
         parsed[row], bad[row] = _parse_object(cells.iloc[row])
     rows = np.flatnonzero(left & of_text)
     text = cells.iloc[rows].str.strip()
+    text = _plain(text)
     sign = decimal or _sign_of(text)
     forms = {",": f"{_COMMA}|{_POINT_THOUSANDS}|{_WHOLE}", ".": f"{_NUMBER}|{_COMMA_THOUSANDS}|{_BOTH}"}
     readable = text.str.fullmatch(f"{forms.get(sign, _NUMBER)}|{_INFINITE}", case=False).to_numpy(bool)
@@ -164,6 +166,14 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarr
     overflows = np.isinf(parsed[rows[readable]]) & ~text.str.contains("inf", case=False).to_numpy(bool)  # 1e999
     bad[rows[~readable]], bad[rows[readable][overflows]] = True, True
     return parsed, bad, [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")] if count else []
+
+
+def _plain(text: pd.Series) -> pd.Series:
+    """Rewrites numbers of other programs: blanks behind the sign, Fortran's exponents, and thousands that are apart by apostrophes or blanks."""
+    odd = text[~text.str.fullmatch(_NUMBER).to_numpy(bool)].str.replace(r"^([+-])\s+(?=[\d.])", r"\1", regex=True)
+    odd = odd.str.replace(r"(?<=[\d.])[dD](?=[+-]\d\d)", "e", regex=True)
+    odd = odd.mask(odd.str.fullmatch(_GROUPED).to_numpy(bool), odd.str.replace(r"['\u2019\s]", "", regex=True))
+    return odd.reindex(text.index).fillna(text) if len(odd) else text
 
 
 def _sign_of(text: pd.Series) -> str | None:

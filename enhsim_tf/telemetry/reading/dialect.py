@@ -13,7 +13,7 @@ BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
 _SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal sign
 _HEAD_LINES, _HEAD = 120, 4_000_000  # lines and characters that are inspected
 _LOOK = 50  # columns that are inspected
-_NUMBER = r"[+-]?(?:\d[\d.,' ]*|[.,]\d+)(?:e[+-]?\d+)?(?: ?(?:[num\u00b5]?s|sec|min|h|hr|days?|%))?"
+_NUMBER = r"(?:[+-] *)?(?:\d[\d.,'\u2019 \u00a0\u202f]*|[.,]\d+)(?:[de][+-]?\d+)?(?: ?(?:[num\u00b5]?s|sec|min|h|hr|days?|%))?"
 _DATE = r"\d{1,4}[-/.: ]\d.*|\d{8}T.*|\d{1,2}[-/ ][a-z]{3}.*|(?:[a-z]{3}, )?\d{1,2} [a-z]{3} .*|[a-z]{3}\.? +\d{1,2},? +\d.*"
 _SOLID = re.compile(f"(?:{_NUMBER}|{_DATE}|[+-]?inf(?:inity)?)$", re.IGNORECASE)
 
