@@ -113,6 +113,7 @@ READ = {
     "no end of the last line": (table("time,v", UTC, VALUES).rstrip("\n"), START),
     "the time last, and words": (table("v,state,when", VALUES, ["on"] * N, UTC), START),
     "files joined with their headers": (table("time,v", UTC, VALUES).replace("\n2024-03-01T00:30", "\ntime,v\n2024-03-01T00:30"), START),
+    "units behind all numbers": (table("time,v", UTC, [f"{value} °C" for value in VALUES]), START),
     "NaN of C": (table("time,v", UTC, VALUES).replace(f",{VALUES[30]}\n", ",-nan(ind)\n"), START),
 }
 
@@ -171,7 +172,10 @@ REFUSED = {
     "a longer line": (table("time,v", MINUTES, VALUES).replace(f",{VALUES[5]}\n", ",1,2,3\n", 1), "line 7 has 4"),
     "a sum at the end": (table("time,v", UTC, VALUES, below="Average,20.1\n"), "'Average' at line 62"),
     "a time of day": (table("time,v", stamps("%H:%M:%S"), VALUES), "column of dates"),
-    "units behind all numbers": (table("time,v", SECONDS, [f"{value} V" for value in VALUES]), f"v ('{VALUES[0]} V')"),
+    "another unit behind some numbers": (
+        table("time,v", SECONDS, [f"{value} {'V' if value > 16 else 'mV'}" for value in VALUES]),
+        f"mV' at line {2 + np.argmax(VALUES <= 16)}",
+    ),
     "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), "'v' more than once"),
     "numbered sensors": (table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)), "--series-column sensor_id"),
 }

@@ -26,6 +26,7 @@ _POINT_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+"
 _BOTH = rf"{_COMMA_THOUSANDS}\.\d*"  # 1,234.5 shows that commas separate thousands
 _WHOLE = r"[+-]?\d+"
 _GROUPED = r"[+-]?[1-9]\d{0,2}(?:['\u2019 \u00a0\u202f]\d{3})+(?:[.,]\d+)?"  # thousands apart by apostrophes or blanks
+_UNIT = r"[+-]?[\d.,'\u2019\s]*[\d.](?:[eE][+-]?\d+)?( ?(?:[%\u2030\u00b0]|[^\W\d_])(?:[^\d:]|\d(?!\d))*)$"  # behind a number
 _LARGEST = float(np.finfo(np.float32).max)
 
 
@@ -36,6 +37,7 @@ def parse_numbers(
     decimal: str | None = None,
     missing_values: Sequence[float | str] = (),
     places: Places = ROWS,
+    units: bool = True,
 ) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
     """Parses a one-dimensional column of numbers, text or objects.
 
@@ -46,6 +48,7 @@ def parse_numbers(
         decimal: Decimal sign of text; the other sign separates thousands. None: inferred from the text.
         missing_values: Numbers and text that mean "no value".
         places: Where the rows are in their file, for messages.
+        units: Whether text such as 23.5 °C is a number, if most cells have the same unit.
 
     Returns:
         float64 values with NaN where missing, the mask of values that could not be parsed, and findings for the cleaning log.
@@ -59,7 +62,7 @@ def parse_numbers(
     if is_plain:
         parsed, bad = cells.to_numpy(), np.zeros(len(cells), bool)
     else:
-        parsed, bad, noted = _parse_text_numbers(cells, decimal)
+        parsed, bad, noted = _parse_text_numbers(cells, decimal, units)
         findings += noted
     beyond = np.isfinite(parsed) & (np.abs(parsed) > _LARGEST)
     if (bad | beyond).any() and not drop:
@@ -147,7 +150,7 @@ def allows_point_thousands(text: pd.Series) -> bool:
     return bool(text.str.strip().str.fullmatch(f"{_POINT_THOUSANDS}|{_WHOLE}|{_COMMA}").all())
 
 
-def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
+def _parse_text_numbers(cells: pd.Series, decimal: str | None, units: bool) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
     parsed, bad = np.full(len(cells), np.nan), np.zeros(len(cells), bool)
     left = ~is_missing(cells)
     of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
@@ -155,6 +158,7 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarr
         parsed[row], bad[row] = _parse_object(cells.iloc[row])
     rows = np.flatnonzero(left & of_text)
     text = cells.iloc[rows].str.strip()
+    text, unit = _without_unit(text) if units else (text, "")
     text = _plain(text)
     sign = decimal or _sign_of(text)
     forms = {",": f"{_COMMA}|{_POINT_THOUSANDS}|{_WHOLE}", ".": f"{_NUMBER}|{_COMMA_THOUSANDS}|{_BOTH}"}
@@ -165,7 +169,17 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarr
     parsed[rows[readable]] = text.astype(np.float64)
     overflows = np.isinf(parsed[rows[readable]]) & ~text.str.contains("inf", case=False).to_numpy(bool)  # 1e999
     bad[rows[~readable]], bad[rows[readable][overflows]] = True, True
-    return parsed, bad, [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")] if count else []
+    findings = [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")] if count else []
+    findings += [Finding("units", len(text), f"numbers written with the unit {unit}: {len(text):,}")] if unit else []
+    return parsed, bad, findings
+
+
+def _without_unit(text: pd.Series) -> tuple[pd.Series, str]:
+    """Takes off the unit that most cells have, and returns it; cells with another one or none are then no numbers."""
+    unit = next(iter(text.iloc[:1_000].str.extract(f"^{_UNIT}", expand=False).mode()), "\n")
+    has_it = text.str.endswith(unit).to_numpy(bool)
+    is_word = text[has_it].nunique() <= 10 or not text.str.contains("[., %\u00b0]").any()  # such as 10 cm or 2a
+    return (text, "") if has_it.sum() <= len(text) / 2 or is_word else (text.str.removesuffix(unit).where(has_it, "?"), unit.strip())
 
 
 def _plain(text: pd.Series) -> pd.Series:

@@ -14,7 +14,7 @@ from enhsim_tf.common.errors import printable, spoken
 
 _ACTIONS = {
     "accepted": "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, own columns, series, "
-    "columns left out, commands, decimal comma, fill values, missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level",
+    "columns left out, commands, decimal comma, units, fill values, missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level",
     "repaired": "descending, unsorted, other rates, jitter, gaps filled",
     "left out": "padding, missing times, bad times, clock change, duplicate rows, same time, missing values, bad values, averaged, short parts",
 }

@@ -137,8 +137,8 @@ class _Reader:
             text = text.map(lambda cell: str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None).astype("str")
         if len(given) and not is_format:
             head, found, unit = given.iloc[:20], None, form
-            if parse_numbers(head, self.what, drop=True)[1].mean() <= 0.5:
-                values, bad, _ = parse_numbers(cells, self.what, drop=True)
+            if parse_numbers(head, self.what, drop=True, units=False)[1].mean() <= 0.5:
+                values, bad, _ = parse_numbers(cells, self.what, drop=True, units=False)
                 exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
                 found = exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values)
             elif head.astype(str).str.strip().str.fullmatch(DURATION).all():

@@ -114,7 +114,7 @@ def _kind_of(cells: pd.Series) -> str:
     for kind, classes in _OBJECTS.items():
         if isinstance(given.iloc[0], classes):
             return kind
-    if not parse_numbers(given, "", drop=True)[1].all():
+    if not parse_numbers(given, "", drop=True, units=False)[1].all():
         return "numbers"
     text = given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)].astype("str").str.strip()
     if len(text) < len(given) / 2:
@@ -124,7 +124,7 @@ def _kind_of(cells: pd.Series) -> str:
     for kind, pattern in (("spans", DURATION), ("times of day", _TIME_OF_DAY)):
         if text.str.fullmatch(pattern).mean() > 0.5:
             return kind
-    return "dates" if date_forms(text) else "words"
+    return "dates" if date_forms(text) else "words" if parse_numbers(given, "", drop=True)[1].all() else "numbers"
 
 
 def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
