@@ -92,6 +92,7 @@ READ = {
     "Julian dates": (table("JD,v", [f"{2460370.5 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
     "MATLAB's days": (table("datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
     "the time once more": (table("date,epoch,v", stamps("%Y-%m-%d %H:%M:%S"), TIMES.as_unit("s").asi8, VALUES), START),
+    "numbers of a server's entries": (table("time,entry_id,v", UTC, range(700, 700 + N), VALUES), START),
     "row numbers of pandas": (table("Unnamed: 0,time,v", range(N), UTC, VALUES), START),
     "a spreadsheet's first line": (table("time;v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=";", above="\ufeffsep=;\n"), START),
     "names and units": (table("time,v", UTC, VALUES).replace("v\n", "v\n(UTC),V\n", 1), START),
@@ -150,6 +151,7 @@ ASKED = {
         60,
     ),
     "an unknown form of time": (table("when,v", stamps("%y-%jT%H:%M"), VALUES), "'24-061T00:00'", {"time": "none"}, 1),
+    "times since 1970 without a name": (table(",v", TIMES.as_unit("s").asi8, VALUES), "--time 'column 0'", {"time": "column 0"}, 60),
     "two clocks": (table("event_time,received_time,v", MINUTES, MINUTES, VALUES), "event_time, received_time", {"time": "event_time"}, 60),
     "states that change often": (
         table("time,mode,v", MINUTES, ["A", "B"] * 30, VALUES),

@@ -92,7 +92,7 @@ def _is_regular(values: np.ndarray) -> bool:
     return bool(np.mean((np.abs(ratios - np.round(ratios)) <= 0.1) & (ratios > 0.5)) >= 0.9)
 
 
-def _is_epoch(values: np.ndarray) -> bool:
+def is_epoch(values: np.ndarray) -> bool:
     """Whether numbers are times since 1970 in s, ms, us or ns."""
     some = values[:: max(1, len(values) // 1_000)]
     return np.isfinite(some).any() and epoch_unit(float(np.median(np.abs(some[np.isfinite(some)])))) is not None
@@ -143,7 +143,7 @@ def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[s
 
 
 def _may_be_clock(tells: int, values: np.ndarray) -> bool:
-    return tells > 0 and (_is_increasing(values) or tells == 2 and (_is_epoch(values) or _is_regular(values[::-1])))
+    return tells > 0 and (_is_increasing(values) or tells == 2 and (is_epoch(values) or _is_regular(values[::-1])))
 
 
 def _one_of(names: list[str], frame: pd.DataFrame, what: str) -> Clock:
@@ -197,7 +197,7 @@ def further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.n
     for name, values in numbers.items():
         words = re.findall(r"[^\W\d_]+", name.casefold())
         is_named = _name_tells(name)[0] > 0 or bool(words) and all(word in _UNIT_OF or word in _BESIDE for word in words)
-        if name not in clock.columns and (is_named or _is_epoch(values)) and _is_same_clock(own, values):
+        if name not in clock.columns and (is_named or is_epoch(values)) and _is_same_clock(own, values):
             found.add(name)
     return found
 

@@ -11,12 +11,12 @@ import pandas as pd
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, unit_of, words_of
+from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, is_epoch, unit_of, words_of
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
 _FLAGS = set("quality qc qa flag flags valid validity mask".split())
-_ROWS = set("index idx row rows rownumber record recordnumber id no nr sample samples number".split())
+_ROWS = set("index idx row rows rownumber record recordnumber id no nr sample samples number entry scan seq counter".split())
 _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
 _OWN = {  # what the commands write beside the values: the columns that give it away, all columns, and the label among them
@@ -165,8 +165,9 @@ def _own_columns(frame: pd.DataFrame) -> set[str]:
 
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
     """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
-    is_unnamed = bool(re.fullmatch(r"column 0|Unnamed: \d+|level_0", name))
-    if not (is_unnamed or _words_of(name) <= _ROWS and _words_of(name)) or not np.isfinite(values).all() or (values % 1).any():
+    is_unnamed = bool(re.fullmatch(r"column 0|Unnamed: \d+|level_0", name)) and not is_epoch(values)
+    words = {word.casefold() for word in words_of(name)}
+    if not (is_unnamed or words <= _ROWS and words) or not np.isfinite(values).all() or (values % 1).any():
         return False
     share = np.mean(np.diff(values) == 1) if len(values) > 1 else 0.0
     if is_unnamed or len(values) < 2:
