@@ -336,6 +336,18 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
         return local
 
 
+def refuse_restart(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
+    """Refuses times that count from zero and begin again, as after a restart; the arguments are those of `refuse_repeated_local_hour`."""
+    steps = np.diff(times)
+    late = 10 * np.median(np.abs(steps)) if len(steps) else 0  # a single late row is followed by as long a step forward
+    back = (steps[:-1] < -late) & (np.abs(steps[1:]) <= late) & (times[1:-1] <= np.minimum.accumulate(times)[:-2] + late)
+    if back.any():
+        raise InputError(
+            f"Expected a clock that increases. Received: times that count from zero and begin again at {log.place(numbers[np.argmax(back) + 1])} of "
+            f"{name}, as after a restart. Read the parts one by one, or give time 'none' (--time none) to count the samples."
+        )
+
+
 def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
     """Refuses times that step back by about one hour only, as a local clock does: without its zone, sorting would mix the two hours.
 
