@@ -172,6 +172,10 @@ REFUSED = {
     "thousands or decimals": (table("time;v", MINUTES, ["1,500"] * N, separator=";"), "--decimal"),
     "points and commas": (table("time;v;w", MINUTES, commas(VALUES), VALUES, separator=";"), "a point in 'w'"),
     "a longer line": (table("time,v", MINUTES, VALUES).replace(f",{VALUES[5]}\n", ",1,2,3\n", 1), "line 7 has 4"),
+    "a cell that is left out between blanks": (
+        table("t v w", SECONDS, VALUES, VALUES, separator=" ").replace(f" {VALUES[5]}", "", 1),
+        "line 7 has 2",
+    ),
     "a clock that begins again": (table("time,v", [*range(40), *np.arange(0.5, 20)], VALUES), "at line 42"),
     "a sum at the end": (table("time,v", UTC, VALUES, below="Average,20.1\n"), "'Average' at line 62"),
     "a time of day": (table("time,v", stamps("%H:%M:%S"), VALUES), "column of dates"),

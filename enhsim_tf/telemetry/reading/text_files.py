@@ -128,7 +128,12 @@ def _parse(stream: io.BytesIO, dialect: Dialect, name: str, decimal: str | None)
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # otherwise lines longer than the header are cut
         try:
-            return pd.read_csv(stream, **options)
+            frame = pd.read_csv(stream, **options)
+            if dialect.separator == BLANKS and frame.iloc[:-1, -1].isna().any():  # the last line may be cut
+                for number, line in enumerate(stream.getvalue()[begin:].rstrip().split(b"\n")[:-1], dialect.first_line + 1):
+                    if 0 < len(line.split()) < width:
+                        raise ValueError(f"line {number} has {len(line.split())} cells, the header {width}")
+            return frame
         except pd.errors.EmptyDataError:
             return pd.DataFrame(columns=range(width), dtype=object)
         except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
