@@ -187,6 +187,12 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
     return form
 
 
+def offset_of(clock: Clock) -> pd.Timedelta | None:
+    """Returns the offset from UTC that the name of a clock states, such as `Date Time, GMT+02:00`, or None."""
+    found = re.search(r"(?<!Etc/)\b(?:UTC|GMT) ?([+-]\d\d?)(?::?(\d\d))?\b", " ".join(clock.columns))
+    return pd.Timedelta(f"{found[1]}:{found[2] or '00'}:00") if found else None
+
+
 def further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], kinds: Mapping[str, str]) -> set[str]:
     """Returns the columns that show the time once more, or show it although samples are counted."""
     found = {name for name in numbers if _name_tells(name)[0] == 2} | {name for name, kind in kinds.items() if kind == "dates"}

@@ -11,7 +11,7 @@ import pandas as pd
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, is_epoch, unit_of, words_of
+from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, is_epoch, offset_of, unit_of, words_of
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
@@ -72,6 +72,8 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
         form = options.time_format or unit_of(clock, table.units, what)
         of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
         times = parse_times(clock.cells, of_what, options.on_bad_times == "drop", form, table.places)
+        if not times.zone and (offset := offset_of(clock)) is not None:
+            times = dataclasses.replace(times, stamps=(times.stamps - offset).tz_localize("UTC"), zone="stated in its name")
     take("clock", clock.columns)
     take("further clocks", further_clocks(clock, times, numbers, kinds))
     counted = [name for name in numbers if name not in roles and clock.columns and _counts(numbers[name])]
