@@ -153,6 +153,12 @@ ASKED = {
     ),
     "an unknown form of time": (table("when,v", stamps("%y-%jT%H:%M"), VALUES), "'24-061T00:00'", {"time": "none"}, 1),
     "times since 1970 without a name": (table(",v", TIMES.as_unit("s").asi8, VALUES), "--time 'column 0'", {"time": "column 0"}, 60),
+    "date and hour in one number": (
+        table("date,v", pd.date_range(START, periods=N, freq="h").strftime("%Y%m%d%H"), VALUES),
+        "%Y%m%d%H",
+        {"options": Cleaning(time_format="%Y%m%d%H")},
+        3_600,
+    ),
     "two clocks": (table("event_time,received_time,v", MINUTES, MINUTES, VALUES), "event_time, received_time", {"time": "event_time"}, 60),
     "states that change often": (
         table("time,mode,v", MINUTES, ["A", "B"] * 30, VALUES),

@@ -215,7 +215,7 @@ def refuse_days(values: np.ndarray, what: str, even_whole: bool = False) -> None
 def _infer_unit(values: np.ndarray, what: str) -> str:
     size = float(np.median(np.abs(values))) if len(values) else 0.0
     if len(values) and (values == np.floor(values)).all():
-        for digits, form in ((7, "%Y%j"), (8, "%Y%m%d"), (14, "%Y%m%d%H%M%S")):
+        for digits, form in ((7, "%Y%j"), (8, "%Y%m%d"), (10, "%Y%m%d%H"), (12, "%Y%m%d%H%M"), (14, "%Y%m%d%H%M%S")):
             if 1.9 * 10 ** (digits - 1) <= values.min() and values.max() < 2.2 * 10 ** (digits - 1):
                 text = pd.Series(values[:1_000].astype(np.int64).astype(str))
                 if pd.to_datetime(text, format=form, errors="coerce").notna().all():
