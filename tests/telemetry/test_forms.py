@@ -503,10 +503,20 @@ def test_rows_without_the_word_of_others_are_a_series():
     check(read_source(long(host=("a", None)))["a"])
 
 
-# from 1979 (3.1e8 s) to 2103 (4.2e9 s)
+# from 1979 (3.1e8 s) to 2103 (4.2e9 s); 6.4e17 are steps of 100 ns since the year 1
 @pytest.mark.parametrize(
     ("size", "unit"),
-    [(3.1e8, "s"), (3.0e8, None), (4.2e9, "s"), (4.3e9, None), (3.1e11, "ms"), (4.2e15, "us"), (3.1e17, "ns"), (4.3e18, None)],
+    [
+        (3.1e8, "s"),
+        (3.0e8, None),
+        (4.2e9, "s"),
+        (4.3e9, None),
+        (3.1e11, "ms"),
+        (4.2e15, "us"),
+        (3.1e17, "ns"),
+        (6.4e17, None),
+        (4.3e18, None),
+    ],
 )
 def test_the_size_of_a_number_says_the_unit_of_a_time_since_1970(size, unit):
     assert epoch_unit(size) == unit
