@@ -70,6 +70,7 @@ READ = {
     "year and day of year": (table("Year,DOY,Hour,Min,v", stamps("%Y"), stamps("%j"), stamps("%H"), stamps("%M"), VALUES), START),
     "year, month and day": (table("YYYY,MM,DD,HH,mn,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES), START),
     "a compact date and a time of day": (table("Date,Time,v", stamps("%Y%m%d"), stamps("%H:%M:%S"), VALUES), START),
+    "months and minutes": (table("YYYY,MM,DD,hh,mm,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES), START),
     "seconds of the day": (table("year,doy,sod,v", stamps("%Y"), stamps("%j"), SECONDS, VALUES), START),
     "milliseconds in a third column": (
         table("date,clock,ms,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), [70] * N, VALUES),

@@ -263,6 +263,8 @@ def _date_parts(frame: pd.DataFrame, numbers: Mapping[str, np.ndarray]) -> Clock
     found = {}
     for name in numbers:
         part = _PART_OF.get(re.sub(r"[^a-z]", "", name.casefold()))
+        if name.strip().casefold() == "mm" and {"month", "doy"} & set(found):  # the second of `MM` and `mm`
+            part = "minute"
         if part is not None:
             found.setdefault(part, name)
     if "year" not in found or not {"doy", "month"} & set(found):
