@@ -94,6 +94,7 @@ READ = {
     "MATLAB's days": (table("datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
     "the time once more": (table("date,epoch,v", stamps("%Y-%m-%d %H:%M:%S"), TIMES.as_unit("s").asi8, VALUES), START),
     "numbers of a server's entries": (table("time,entry_id,v", UTC, range(700, 700 + N), VALUES), START),
+    "quality after capitals": (table("time,v,OPCQuality", UTC, VALUES, [192] * N), START),
     "an offset in the name": (table('"Time, GMT+02:30",v', stamps("%Y-%m-%d %H:%M"), VALUES), START - pd.Timedelta("2.5h")),
     "row numbers of pandas": (table("Unnamed: 0,time,v", range(N), UTC, VALUES), START),
     "a spreadsheet's first line": (table("time;v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=";", above="\ufeffsep=;\n"), START),

@@ -56,8 +56,8 @@ class Clock(NamedTuple):
 
 
 def words_of(name: str) -> list[str]:
-    """Splits the name of a column into words of letters; capitals in the middle begin a word."""
-    return re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name))
+    """Splits the name of a column into words of letters; capitals in the middle begin a word, as in `OPCQuality`."""
+    return re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", name))
 
 
 def _name_tells(name: str) -> tuple[int, str | None]:
