@@ -106,6 +106,7 @@ READ = {
     "day of year in UTC": (table("UTC,v", [f"{text[:-3]}Z" for text in stamps("%Y-%jT%H:%M:%S.%f")], VALUES), START),
     "a log cut by a power failure": (table("time,v", UTC, VALUES, below="\x00" * 300), START),
     "commas behind each line": (table("time,v,", UTC, VALUES, [""] * N), START),
+    "a name without cells": (table("time,v,comment", UTC, VALUES), START),
     "tabs": (table("time\tv", UTC, VALUES, separator="\t"), START),
     "bars": (table("time|v", UTC, VALUES, separator="|"), START),
     "quoted decimal commas": (table("time,v", UTC, [f'"{value}"' for value in commas(VALUES)]), START),

@@ -127,6 +127,8 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
         begin = next(number for number, row in enumerate(rows) if row) + (not no_header)
     while begin > 0 and len(rows[begin - 1]) == width and share(rows[begin - 1]) > 0:
         begin -= 1
+    if begin > 0 and len(rows[begin - 1]) == width + 1 and share(rows[begin - 1]) == 0:  # of a last column that is mostly left out
+        width += 1
     block = next((number for number in range(begin, 0, -1) if rows[number - 1]), 0)  # a blank line may follow the names
     block = block if block and len(rows[block - 1]) == width else begin
     top = block
