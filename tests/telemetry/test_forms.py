@@ -446,6 +446,17 @@ def test_a_workbook_is_read_with_its_dates(tmp_path):
     assert (series.name, series.attrs["places"].of(0)) == ("Spannung", "line 4")
 
 
+def test_a_workbook_whose_first_sheet_has_no_numbers_says_which_sheet_was_read(tmp_path, refused):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for cell, sheet in (("by hand", book.active), (1.5, book.create_sheet())):
+        sheet.append(["v"])
+        sheet.append([cell])
+    book.save(tmp_path / "a.xlsx")
+    with refused("only the first sheet was read: Sheet"):
+        read_source(tmp_path / "a.xlsx")
+
+
 def test_pandas_objects_are_sources():
     frame = pd.DataFrame({"time": TIMES, "v": VALUES})
     check(only(read_source(frame)))

@@ -88,7 +88,7 @@ def read_table_channels(
         chosen = {name: chosen[name] for name in columns}
     if not chosen:
         left = ", ".join(_with_cell(table.frame[name]) for names in layout.left_out.values() for name in names)
-        left = f"; left out: {left}" if left else ""
+        left = "".join(f"; {finding.text}" for finding in findings if finding.kind == "files") + (f"; left out: {left}" if left else "")
         raise InputError(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}. Give another table, or name the columns."
         )
