@@ -24,7 +24,7 @@ from enhsim_tf.telemetry.sources import Source, read_source
 from enhsim_tf.telemetry.windows import runs_of
 
 _QUIET = ("constant", "stuck", "quantised", "changing level")
-_NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns")  # findings of columns that are no inputs
+_NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns", "columns left out")  # kinds of such columns
 _FEW_ODD = 0.002  # share of steps that are no whole number of intervals, above which a run is interpolated
 
 

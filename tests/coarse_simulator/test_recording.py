@@ -61,6 +61,10 @@ def test_a_table_is_read_with_its_labels(written):
     assert list(part.carried["mask"]) == [0] * 20 + [1] * 20 + [2] * 20 and "mask" in " ".join(found.notes)
 
 
+def test_columns_without_numbers_are_no_inputs_and_named(written):
+    assert any("columns without numbers: scenario, pump" in note for note in read_recording(written(table().assign(pump="true"))).notes)
+
+
 def test_labels_follow_the_repairs_of_the_rows(written):
     frame = table()
     frame = pd.concat([frame.iloc[30:], frame.iloc[:30].drop(index=[5, 6])])  # unsorted, with a short gap
