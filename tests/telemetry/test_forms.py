@@ -103,6 +103,10 @@ READ = {
     "lines about the measurement": (table("Version\t2\n***End***\t\n\nX_Value\tv", SECONDS, commas(VALUES), separator="\t"), ZERO),
     "NumPy's": (table("# time v", [f"{second:.6e}" for second in SECONDS], VALUES, separator=" "), ZERO),
     "NumPy's, with units": (table("# t [s]  v", SECONDS, VALUES, separator=" "), ZERO),
+    "names and units in comments": (
+        table("#YY MM DD hh mm v\n#- - - - - m/s", *(stamps(f"%{part}") for part in "YmdHM"), VALUES, separator=" "),
+        START,
+    ),
     "day of year in UTC": (table("UTC,v", [f"{text[:-3]}Z" for text in stamps("%Y-%jT%H:%M:%S.%f")], VALUES), START),
     "a log cut by a power failure": (table("time,v", UTC, VALUES, below="\x00" * 300), START),
     "commas behind each line": (table("time,v,", UTC, VALUES, [""] * N), START),

@@ -37,7 +37,7 @@ _UNIT_OF = {word: unit for unit, words in _UNITS.items() for word in words.split
 _DAY_WORDS = ("mjd", "jd", "datenum")
 _FEWEST = 8  # rows below which no step of a column counts as regular
 _PARTS = {
-    "year": "year yyyy yr jahr",
+    "year": "year yyyy yy yr jahr",
     "month": "month mo mm monat",
     "day": "day dy dom dd tag",
     "doy": "doy dayofyear jday ddd",

@@ -160,14 +160,19 @@ def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
 
 
 def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
-    """Returns the dialect with names from the last comment above the data, as NumPy writes them, or None if it has not as many."""
+    """Returns the dialect with names from the last comment above the data, as NumPy writes them, or None if it has not as many.
+
+    If that repeats a name, it holds units, as in files of weather buoys, and the comment before it the names.
+    """
     comments = [line.lstrip("#%").strip() for line in lines[: found.first_line] if line.startswith(("#", "%"))]
     if not comments:
         return None
     mark = re.escape(found.separator)
     if found.separator == BLANKS:
         mark = BLANKS if len(comments[-1].split()) == len(found.names) else r"\s{2,}|\t"
-    names = [name.strip() for name in re.split(mark, comments[-1])]
+    *before, names = ([name.strip() for name in re.split(mark, comment)] for comment in comments[-2:])
+    if before and len(before[0]) == len(names) == len(set(before[0])) > len(set(names)):
+        found, names = dataclasses.replace(found, units=names), before[0]
     if len(names) != len(found.names) or not all(names[1:]) or all(_SOLID.match(name) for name in names):
         return None
     return dataclasses.replace(found, names=names)
