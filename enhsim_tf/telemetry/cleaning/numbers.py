@@ -176,10 +176,13 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None, units: bool) -> t
 
 def _without_unit(text: pd.Series) -> tuple[pd.Series, str]:
     """Takes off the unit that most cells have, and returns it; cells with another one or none are then no numbers."""
-    unit = next(iter(text.iloc[:1_000].str.extract(f"^{_UNIT}", expand=False).mode()), "\n")
-    has_it = text.str.endswith(unit).to_numpy(bool)
-    is_word = text[has_it].nunique() <= 10 or not text.str.contains("[., %\u00b0]").any()  # such as 10 cm or 2a
-    return (text, "") if has_it.sum() <= len(text) / 2 or is_word else (text.str.removesuffix(unit).where(has_it, "?"), unit.strip())
+    found = text.iloc[:1_000].str.extract(f"^{_UNIT}", expand=False).mode()
+    if not len(found):
+        return text, ""
+    has_it = text.str.endswith(found.iloc[0]).to_numpy(bool)
+    if has_it.sum() <= len(text) / 2 or text[has_it].nunique() <= 10 or not text.str.contains("[., %\u00b0]").any():  # words: 10 cm or 2a
+        return text, ""
+    return text.str.removesuffix(found.iloc[0]).where(has_it, "?"), found.iloc[0].strip()
 
 
 def _plain(text: pd.Series) -> pd.Series:
