@@ -185,7 +185,8 @@ for half, chosen in {"first": ~is_late, "second": is_late}.items():
 
 # %% [markdown]
 # The interval counts the chance in the rows only. The records of a half differ by far more, so the first half's lead over 0.5 may be
-# chance. One seed is not enough: the [study of readings](../studies/readings/README.md) repeats this over seeds, roundings and readings of the paper.
+# chance. One seed is not enough: the [study of readings](../studies/readings/README.md) repeats this over seeds, roundings and readings
+# of the paper.
 
 # %%
 _ = verdict(pipeline, "C4", "C5")
