@@ -4,6 +4,8 @@ import dataclasses
 import zlib
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
 
@@ -12,28 +14,30 @@ if TYPE_CHECKING:
 
 
 class InfluxTelemetry:
-    """The paper's store: a measurement in InfluxDB 2, through the tool's client. The place is that of the option `--store`."""
+    """The paper's store: a series in InfluxDB 2. The place is that of the option `--store`."""
 
     def __init__(self, place: str):
         if place != "influxdb" and not place.startswith("influxdb://"):
             raise InputError(f"Expected --store parquet, influxdb or influxdb://bucket/measurement/field. Received: --store {place}.")
         self.location = parse_location("influxdb://telemetry/enhsim_tf/value" if place == "influxdb" else place)
-        self.store = InfluxStore(self.location)
-        self.store.check()
+        InfluxStore(self.location).check()
 
     def write(self, telemetry: "Telemetry") -> None:
-        """Places a series, tagged by its content, unless it is there."""
-        from enhsim_tf.telemetry.series import Telemetry as Series
+        """Places a series, with a tag that is the checksum of its content, so that other series at the place stay apart."""
+        import pandas as pd
 
-        content = f"{zlib.crc32(telemetry.values.tobytes()):08x}"
+        self.written = telemetry
+        self.times = pd.Timestamp(telemetry.start).as_unit("ns").value + np.round(1e9 * telemetry.time).astype(np.int64)
+        content = f"{zlib.crc32(self.times.tobytes() + telemetry.values.tobytes()):08x}"
         self.store = InfluxStore(dataclasses.replace(self.location, tags=(*self.location.tags, ("run", content))))
-        if telemetry.name not in self.store.names():
-            start = telemetry.start.replace("Z", "+00:00")
-            self.store.write(Series(telemetry.values, telemetry.interval, start=start, name=telemetry.name))
+        self.store.write(self.times, telemetry.values)
 
     def read(self) -> "Telemetry":
-        """Reads the series back."""
-        from enhsim_tf.paper.telemetry import Telemetry
-
-        series = self.store.read(self.store.names()[0])
-        return Telemetry(series.values, series.interval_s, series.start.replace("+00:00", "Z"), series.name)
+        """Reads the series back; raises InputError if a sample is missing."""
+        times, values = self.store.read()
+        if not np.array_equal(times, self.times):
+            raise InputError(
+                f"Expected the {len(self.times):,} samples that were written to {self.location}. Received: {len(times):,}, or other times. "
+                "Run the command again, or give another --store."
+            )
+        return dataclasses.replace(self.written, values=values.astype(np.float32))

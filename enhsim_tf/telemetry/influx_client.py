@@ -28,7 +28,6 @@ VARIABLES = ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG")
 
 _Answer = TypeVar("_Answer")
 _URL = r"https?://(?:[\w.-]+|\[[\da-fA-F:.]+\])(?::[1-9]\d{0,4})?(?:/[!-~]*)?"  # without a name or a password
-_ALL_TIME = "1677-09-21T00:12:44Z", "2262-04-11T23:47:16.854775806Z"
 _REFUSALS = (ApiException, FluxQueryException, FluxCsvParserException)
 _MAY_PASS = (408, 429, 500, 502, 503, 504)  # HTTP status codes of a server that is busy or still starting
 _TIMEOUT_MS = 60_000  # timeout of a request if INFLUXDB_V2_TIMEOUT is not set; a disk may be slow
@@ -61,10 +60,6 @@ class InfluxServer:
         The client's own writer of data frames is not used: it evaluates the names of tags as code.
         """
         self._repeat(lambda: self._client.write_api(SYNCHRONOUS).write(self.bucket, record=lines.encode(), write_precision="ns"))
-
-    def delete(self, predicate: str) -> None:
-        """Deletes all points that match a predicate, at any time."""
-        self._repeat(lambda: self._client.delete_api().delete(*_ALL_TIME, predicate, self.bucket, self.organisation))
 
     def ask(self, query: str, limit: int | None = None) -> list[Mapping[str, Any]]:
         """Runs a Flux query with a small result; returns its rows, or the first `limit` of them."""

@@ -1,4 +1,4 @@
-"""The telemetry series, which all other packages work on: values with their times and unit.
+"""The telemetry series, which all other packages work on: values with their times.
 
 This is the data source, step 4 of the paper's pipeline. Values are checked but never changed or interpreted.
 """
@@ -23,7 +23,6 @@ class Telemetry:
             the same `start`.
         start: Zero of the time axis as ISO 8601 text in UTC, or None if the source has no times.
         name: Channel name.
-        unit: Unit of the values.
     """
 
     values: np.ndarray
@@ -31,7 +30,6 @@ class Telemetry:
     offset_s: float = 0.0
     start: str | None = None
     name: str = "telemetry"
-    unit: str = "1"
 
     def __len__(self) -> int:
         return len(self.values)

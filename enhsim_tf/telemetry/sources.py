@@ -8,14 +8,12 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.arrays import read_array_channels
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.influx_store import InfluxStore
-from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.reading.channels import Channels, read_table_channels
 from enhsim_tf.telemetry.registry import SOURCES, TABLES
 
@@ -28,16 +26,14 @@ def read_source(source: Source, columns: Sequence[str] | None = None, time: str 
     Args:
         source: A table (`.csv`, `.tsv`, `.txt`, `.parquet`, `.xlsx`, also inside `.gz` or `.zip`), several tables with the same columns, a
             folder of tables, a `.npy` file, `influxdb://bucket/measurement/field?tag=value`, or a pandas DataFrame or Series.
-        columns: Names of the channels: columns of a table, column numbers of an array, or series of a store. None: all
-            channels that hold numbers.
+        columns: Names of the channels: columns of a table, or column numbers of an array. None: all channels that hold numbers.
         time: Name of a table's time column. None: the column is detected, if there is one. `NO_TIME` ("none"): the samples
             are counted.
         options: How times, labels, series and numbers are read; see `Cleaning`.
 
     Returns:
         Raw channels by name, in the order of the source. A channel with times has a `DatetimeIndex`, with NaT where a time is
-        missing; a channel without times has a `RangeIndex`. `series.attrs["unit"]` holds the unit, if it is known. The dictionary also
-        has the whole `table` and the `commands` of an array, see `Channels`.
+        missing; a channel without times has a `RangeIndex`. The dictionary also has the whole `table` and the `commands` of an array, see `Channels`.
 
     Raises:
         InputError: If the source cannot be read, or a column does not exist.
@@ -77,16 +73,11 @@ def _exists(path: Path) -> bool:
 
 
 def _read_influx(source: str, columns: list[str] | None, time: str | None) -> Channels:
-    """Reads the series written by an `InfluxStore`, or otherwise the one series at the address, named after its field."""
-    if time is not None:
-        raise InputError(f"Expected time with a table only. Received: time={time!r} with {source}. Leave it out.")
+    """Reads the one series at an address, named after its field."""
+    if time is not None or columns is not None:
+        given = f"time={time!r}" if time is not None else f"columns={columns}"
+        raise InputError(f"Expected {given.partition('=')[0]} with a table only. Received: {given} with {source}. Leave it out.")
     store = InfluxStore(source)
-    names = store.names()
-    if names:
-        return Channels({name: to_series(store.read(name)) for name in (names if columns is None else columns)})
-    if columns is not None:
-        raise InputError(f"Expected the field in the address alone. Received: columns={columns} with {source}. Leave them out.")
-    times, values = (np.concatenate(blocks) for blocks in zip(*store.chunks(), strict=True))
-    field = store.location.field
+    times, values = store.read()
     index = pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time")
-    return Channels({field: pd.Series(values, index=index, name=field)})
+    return Channels({store.location.field: pd.Series(values, index=index, name=store.location.field)})

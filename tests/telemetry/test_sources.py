@@ -129,11 +129,13 @@ def test_bad_sources_are_refused(tmp_path, refused, case):
         read_source(path, **arguments)
 
 
-def test_influxdb_refuses_a_time_column_and_an_incomplete_location(monkeypatch, refused):
+def test_influxdb_refuses_columns_and_an_incomplete_location(monkeypatch, refused):
     for name in ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG"):
         monkeypatch.delenv(name, raising=False)
     with refused("time='utc'"):
         read_source("influxdb://bucket/bus/volts", time="utc")
+    with refused("columns=['volts']"):
+        read_source("influxdb://bucket/bus/volts", ["volts"])
     with refused("INFLUXDB_V2_URL"):
         read_source("influxdb://bucket/bus/volts")
 
@@ -148,11 +150,11 @@ def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
 
 
 def test_telemetry_to_pandas_and_back(refused):
-    timed = Telemetry(VALUES.astype(np.float32), 0.25, 2.5, "2020-03-01T06:00:00+00:00", "volts", "V")
+    timed = Telemetry(VALUES.astype(np.float32), 0.25, 2.5, "2020-03-01T06:00:00+00:00", "volts")
     series = to_series(timed)
-    assert (series.index == TIMES + pd.Timedelta("2.5s")).all() and (series.name, series.attrs["unit"]) == ("volts", "V")
+    assert (series.index == TIMES + pd.Timedelta("2.5s")).all() and series.name == "volts"
     (back,) = clean(series).parts
-    assert (back.values == timed.values).all() and (back.interval_s, back.name, back.unit) == (0.25, "volts", "V")
+    assert (back.values == timed.values).all() and (back.interval_s, back.name) == (0.25, "volts")
     assert pd.Timestamp(back.start) + pd.Timedelta(seconds=back.offset_s) == series.index[0]
     counted = to_series(Telemetry(VALUES.astype(np.float32), offset_s=7.0))
     assert (counted.index[0], clean(counted).longest.offset_s) == (7, 7.0)

@@ -45,7 +45,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     Args:
         series: The channel. Its values can be anything that can be parsed as numbers. Its index holds the times: date-times,
             ISO 8601 text, or numbers since 1970. An array, or a series with a `RangeIndex`, has no times, and its samples are
-            counted instead. `series.attrs["unit"]` may give the unit of the values.
+            counted instead.
         options: How problems are treated. None: the defaults of `Cleaning`.
 
     Returns:
@@ -82,8 +82,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
 
     first = parts[0].begin if has_time else -base
     start = iso_time(base + round(first)) if has_time else None
-    unit = str(about.get("unit", "1"))
-    telemetry = [Telemetry(part.values.astype(np.float32), interval / 1e9, (part.begin - first) / 1e9, start, name, unit) for part in parts]
+    telemetry = [Telemetry(part.values.astype(np.float32), interval / 1e9, (part.begin - first) / 1e9, start, name) for part in parts]
     report = Report(name, len(values), used, sum(map(len, telemetry)), len(telemetry), interval / 1e9, tuple(log.findings))
     return Cleaned(telemetry, report)
 
