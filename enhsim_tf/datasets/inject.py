@@ -30,7 +30,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.Dat
         options: Which anomalies are injected, and where.
 
     Returns:
-        A data frame with the index of `sources.to_series` and the columns `value` and `label_columns.LABELS`. `frame.attrs` holds
+        A data frame with the index of `pandas_series.to_series` and the columns `value` and `label_columns.LABELS`. `frame.attrs` holds
         `noise_sd`, and `anomalies`, a list of `placing.PlacedEvent` in the order of time. Samples that are not marked keep the value
         of the telemetry.
 
