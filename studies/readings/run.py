@@ -27,8 +27,9 @@ READINGS: Mapping[str, Mapping[str, Any]] = {
     "learning rate 0.01": {"learning_rate": 0.01},
     "15,000 windows": {"num_windows": 15_000},
 }
-ROUNDINGS = {"oneDNN": "1", "Eigen": "0"}
-"""Values of `TF_ENABLE_ONEDNN_OPTS`, by the library whose order of summation they choose."""
+ANOTHER = "oneDNN, another processor"
+ROUNDINGS = {"oneDNN": "1", "Eigen": "0", ANOTHER: "1"}
+"""Values of `TF_ENABLE_ONEDNN_OPTS`, by the library whose order of summation they choose, which also depends on the processor."""
 TABLE = "measurements.parquet"
 KEYS = ["reading", "rounding", "seed"]
 
@@ -47,18 +48,21 @@ class Run(NamedTuple):
     seed: int
 
 
-def runs(num_reference: int, num_other: int) -> list[Run]:
-    """The runs in their order: all readings with one seed before the next seed, the reference with both roundings.
+def runs(num_reference: int, num_other: int, on_another: bool = False) -> list[Run]:
+    """The runs in their order: all readings with one seed before the next seed, the reference with both roundings of the processor.
 
     Args:
         num_reference: Number of seeds of the reference.
         num_other: Number of seeds of every other reading.
+        on_another: Whether this is another processor than that of the other runs; only the reference is run on it.
     """
+    if on_another:
+        return [Run("reference", ANOTHER, seed) for seed in range(num_reference)]
     planned = []
     for seed in range(max(num_reference, num_other)):
         for reading in READINGS:
             if seed < (num_reference if reading == "reference" else num_other):
-                planned += [Run(reading, rounding, seed) for rounding in ROUNDINGS if reading == "reference" or rounding == "oneDNN"]
+                planned += [Run(reading, rounding, seed) for rounding in ("oneDNN", "Eigen")[: 2 if reading == "reference" else 1]]
     return planned
 
 

@@ -94,8 +94,8 @@ def publish(table: pd.DataFrame) -> dict[str, Any]:
         claims[claim.id] = decided | {"ranges": ranges}
     tested = [claims[claim.id]["verdict"] for claim in CLAIMS if claim.is_tested]
     sign = "[¬Re]" if NOT_REPRODUCED in tested else "[Re]" if set(tested) == {REPRODUCED} else "[Re, in part]"
-    seeds, readings = reference["seed"].nunique(), table["reading"].nunique()
-    return {"title": sign, "basis": f"{seeds} seeds of the reference with two roundings; readings: {readings}", "claims": claims}
+    seeds, roundings, readings = reference["seed"].nunique(), reference["rounding"].nunique(), table["reading"].nunique()
+    return {"title": sign, "basis": f"seeds of the reference: {seeds}, roundings: {roundings}; readings: {readings}", "claims": claims}
 
 
 def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
