@@ -89,7 +89,7 @@ class Claim:
     limits: tuple[Limit, ...]
     measure: Measure
     is_tested: bool = True
-    margin: float = 0.5
+    margin: float = 1.0
 
 
 def kept(stage: str, *networks: str, version: int = 1) -> Callable[[Measure], Measure]:
@@ -525,14 +525,16 @@ def title(records: list[dict[str, Any]]) -> str:
 
 
 def outside(records: list[dict[str, Any]], published: Mapping[str, Any]) -> list[str]:
-    """One line for each measurement of a run that lies outside its published range over seeds and processors.
+    """One line for each measurement with a limit that lies outside its published range over seeds and processors.
 
     Each range is widened on both sides by the claim's `margin` times its width, and by 5 % of its larger end, or by .005 if that is more.
     """
-    margins, lines = {claim.id: claim.margin for claim in CLAIMS}, []
+    claims, lines = {claim.id: claim for claim in CLAIMS}, []
     for record in records:
-        for name, (low, high) in published["claims"][record["id"]]["ranges"].items():
-            margin = margins[record["id"]] * (high - low) + max(0.05 * max(abs(low), abs(high)), 0.005)
+        claim, ranges = claims[record["id"]], published["claims"][record["id"]]["ranges"]
+        for name in dict.fromkeys(limit.name for limit in claim.limits):
+            low, high = ranges[name]
+            margin = claim.margin * (high - low) + max(0.05 * max(abs(low), abs(high)), 0.005)
             value = record["measured"].get(name)
             if value is None or not low - margin <= value <= high + margin:
                 lines.append(f"{record['id']}: {name} is {value}, published {low:g} to {high:g}")

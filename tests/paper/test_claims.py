@@ -141,9 +141,9 @@ def test_the_sign_comes_from_the_claims_that_the_paper_tests(verdicts, sign):
     assert title([*records, {"verdict": "does not hold", "is_tested": False}]) == sign
 
 
-@pytest.mark.parametrize(("value", "is_named"), [(1.0, False), (2.0, False), (0.45, False), (0.35, True), (2.65, True), (None, True)])
+@pytest.mark.parametrize(("value", "is_named"), [(1.0, False), (2.0, False), (-0.05, False), (-0.15, True), (3.15, True), (None, True)])
 def test_a_measurement_outside_the_widened_range_is_named(value, is_named):
-    records = [{"id": "C1", "measured": {} if value is None else {"nrmse": value}}]  # half the width of 1, and 5 % of 2, on each side
+    records = [{"id": "C1", "measured": {} if value is None else {"nrmse": value}}]  # the width of 1, and 5 % of 2, on each side
     lines = outside(records, {"claims": {"C1": {"ranges": {"nrmse": [1.0, 2.0]}}}})
     assert [line.startswith("C1: nrmse") for line in lines] == [True] * is_named
 
