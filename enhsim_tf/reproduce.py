@@ -26,7 +26,7 @@ examples:
 
 further experiments are studies with commands of their own: python -m studies.robustness, and others in studies/
 
-exit code: 0 every measurement lies within its published range, 1 one does not, 2 an input or option cannot be used
+exit code: 0 every measurement with a limit lies within its published range, 1 one does not, 2 an input or option cannot be used
 """
 
 

@@ -29,8 +29,8 @@ def read_published() -> dict[str, Any]:
     """The published verdicts, which the study of readings writes.
 
     They are `title`, `basis` (what they rest on, in words) and `claims`: for each id `verdict`, `runs` (of the reference: in how many it is
-    reproduced, partly and not), `decided_by` (the reading that decides an undecided claim, or None) and `ranges` (for each measurement the
-    lowest and the highest value over seeds and processors).
+    reproduced, partly and not), `decided_by` (the reading that decides an undecided claim, or None) and `ranges` (for each measurement
+    with a limit the lowest and the highest value over seeds and processors).
     """
     return json.loads(PUBLISHED.read_text(encoding="utf-8"))
 

@@ -1,12 +1,13 @@
 import pandas as pd
 import pytest
 
+from enhsim_tf.paper.claims import outside
 from enhsim_tf.paper.report import UNDECIDED, read_published
 from enhsim_tf.paper.settings import make_settings
 from studies.common.command import PUBLISHED
 from studies.readings import run as runs_of
 from studies.readings.figure import FIGURES
-from studies.readings.run import READINGS, ROUNDINGS, Run, collect, runs
+from studies.readings.run import READINGS, Run, collect, runs
 from studies.readings.summary import TOUCHED_BY, decide, publish, shares, touches, verdicts
 
 GOOD, BAD = {"nrmse": 0.1, "coarse_nrmse": 0.6, "allowed_nrmse": 0.15, "ridge_nrmse": 0.03}, 0.7
@@ -21,9 +22,14 @@ def table_of(bad):
     return pd.DataFrame(rows, columns=[*runs_of.KEYS, "claim", "name", "value"])
 
 
+def published_table():
+    return pd.read_parquet(PUBLISHED / "readings" / "results" / "measurements.parquet")
+
+
 def test_the_plan_has_both_roundings_of_the_reference_and_complete_first_seeds():
     planned = runs(10, 5)
-    assert len(planned) == len(set(planned)) == 10 * len(ROUNDINGS) + 5 * (len(READINGS) - 1)
+    assert len(planned) == len(set(planned)) == 10 * 2 + 5 * (len(READINGS) - 1)
+    assert set(runs(10, 5, on_another=True) + planned) == {Run(*row) for row in published_table()[runs_of.KEYS].itertuples(index=False)}
     assert {run.seed for run in planned[: len(READINGS) + 1]} == {0}
 
 
@@ -80,5 +86,13 @@ def test_the_figure_shows_a_share_for_each_reading_that_touches_a_claim():
 
 
 def test_the_published_verdicts_come_from_the_published_table(near):
-    table = pd.read_parquet(PUBLISHED / "readings" / "results" / "measurements.parquet")
-    assert read_published() == near(publish(table))
+    assert read_published() == near(publish(published_table()))
+
+
+def test_few_sound_runs_are_outside_the_ranges_of_all_other_seeds():
+    table, named = published_table(), []
+    for (reading, rounding, seed), run in table[table["reading"] == "reference"].groupby(runs_of.KEYS):
+        others = publish(table[(table["reading"] != reading) | (table["seed"] != seed)])
+        records = [{"id": claim, "measured": dict(zip(part["name"], part["value"], strict=True))} for claim, part in run.groupby("claim")]
+        named += [(rounding, seed)] if outside(records, others) else []
+    assert named == [("Eigen", 4)]  # its enhancer ended at twice the error of all others
