@@ -17,7 +17,7 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimula
 from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate  # noqa: E402
 from enhsim_tf.datasets.mix import Mix, ScenarioShare  # noqa: E402
-from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
+from enhsim_tf.datasets.plan import Plan  # noqa: E402
 from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
 from tests.known_simulators import of_waves  # noqa: E402
 
@@ -32,23 +32,22 @@ def plain(noise_sd=0.1, **others):
 
 
 class PlainMaker(ShardMaker):
-    """Makes shards with plain simulators, and sleeps in between."""
+    """Makes shards with a plain simulator, and sleeps in between."""
 
     delay_s = 0.0
 
     @property
-    def simulators(self):
+    def simulator(self):
         time.sleep(self.delay_s)
-        return [plain(0.1 * (number + 1)) for number, _ in enumerate(self.plan.models)]
+        return plain()
 
 
 class SlowMaker(PlainMaker):
     delay_s = 0.03
 
 
-def plan(num_windows=1_000, shard=50, seed=3, mix=MIX, shares=(1.0,)):
-    models = [Model(f"model-{number}", Path("nowhere"), share, str(number) * 64, WINDOW, INTERVAL_S) for number, share in enumerate(shares)]
-    return Plan(mix, tuple(models), seed, num_windows, shard)
+def plan(num_windows=1_000, shard=50, seed=3, mix=MIX, checksum="0" * 64):
+    return Plan(mix, "model", Path("nowhere"), checksum, WINDOW, INTERVAL_S, ("volts",), seed, num_windows, shard)
 
 
 def die_at_thirteen(number):

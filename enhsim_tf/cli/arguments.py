@@ -112,7 +112,7 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
         "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
     )
     _add_workers(large, "number of worker processes", None)
-    large.add_argument("--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios and models")
+    large.add_argument("--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios")
     _add_seed(generate, None)  # None shows that the option was not given: a scenario file may contain the seed
 
 

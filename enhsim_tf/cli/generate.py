@@ -99,15 +99,11 @@ def _generate_copies(options: argparse.Namespace) -> int:
 
 
 def _plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
-    """Returns the plan of each data set, one per channel or one from several models, by its output folder."""
+    """Returns the plan of the data set of each model, by its output folder."""
     mix = make_mix(options.scenario, options.nominal_share) if options.scenarios is None else read_mix(options.scenarios)
     seed, num_windows = (given if given is not None else kept for given, kept in ((options.seed, mix.seed), (options.windows, mix.windows)))
     if num_windows is None:
         raise InputError(f"Expected a number of windows. Received: none in {options.scenarios}. Give --windows.")
-    if mix.models:
-        if options.channel:
-            raise InputError(f"Expected no --channel with {options.scenarios}, which names models. Received: --channel. Leave it out.")
-        return {options.out: make_plan(mix, options.models, seed or 0, num_windows)}
     models = chosen_of(models_of(options.models), options.channel)
     outs = {name: options.out if len(models) == 1 else folder_of(options.out, name) for name in models}
-    return {outs[name]: make_plan(mix, folder, seed or 0, num_windows, name) for name, folder in models.items()}
+    return {outs[name]: make_plan(mix, folder, seed or 0, num_windows) for name, folder in models.items()}

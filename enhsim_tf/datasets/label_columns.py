@@ -92,9 +92,8 @@ def parquet_options(schema: pa.Schema) -> dict[str, Any]:
 
     Values store bytes of equal significance together: signs and exponents compress well, noisy mantissas do not.
     """
-    texts = [name for name in ("scenario", "model") if name in schema.names]
     encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in schema.names if name.startswith("window")}
-    return {"compression": "zstd", "use_dictionary": texts, "column_encoding": encoding, "write_statistics": texts}
+    return {"compression": "zstd", "use_dictionary": ["scenario"], "column_encoding": encoding, "write_statistics": ["scenario"]}
 
 
 def write_table(path: str | os.PathLike, frame: pd.DataFrame, timeeval: Sequence[str] = ()) -> None:

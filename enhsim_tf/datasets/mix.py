@@ -1,4 +1,4 @@
-"""The mix of a large data set, from the options or from a scenario file (docs/large_data_sets.md): scenarios, models and their shares."""
+"""The mix of a large data set, from the options or from a scenario file (docs/large_data_sets.md): scenarios and their shares."""
 
 import collections
 import dataclasses
@@ -56,21 +56,11 @@ class ScenarioShare:
 
 
 @dataclass(config=_KEYS)
-class ModelShare:
-    """A model and its share of all windows."""
-
-    folder: _Text  # relative to the folder of all models
-    name: _Text | None = None  # label of its windows; its folder, if none is given
-    share: _number(1) | None = None  # the same as that of the other models, if none is given
-
-
-@dataclass(config=_KEYS)
 class Mix:
-    """The composition of a data set. All shares of windows add up to one, and so do those of models."""
+    """The composition of a data set. All shares of windows add up to one."""
 
     nominal: _number(1) | None = None  # share of nominal windows: what the scenarios leave, if none is given
     scenarios: Annotated[tuple[ScenarioShare, ...], Field(max_length=1_000)] = ()
-    models: Annotated[tuple[ModelShare, ...], Field(max_length=20)] = ()  # each worker holds all models in memory
     windows: _whole(1, MOST_WINDOWS) | None = None
     seed: _whole(0, 2**31 - 1) | None = None
     shard: _whole(1, 10_000_000) | None = None  # windows per file
@@ -79,13 +69,8 @@ class Mix:
     def _go_together(self) -> Self:
         shared = math.fsum(scenario.share for scenario in self.scenarios)
         self.nominal = max(0.0, 1 - shared) if self.nominal is None else self.nominal
-        for model in self.models:
-            model.name, model.share = model.name or model.folder, 1 / len(self.models) if model.share is None else model.share
-        if len({model.name for model in self.models}) < len(self.models):
-            raise ValueError("no two models have the same name")
-        totals = [self.nominal + shared, *([math.fsum(model.share for model in self.models)] if self.models else [])]
-        if any(abs(total - 1) > _TOLERANCE for total in totals):
-            raise ValueError(f"nominal and the shares of the scenarios, and the shares of the models, add up to 1, not to {totals}")
+        if abs(self.nominal + shared - 1) > _TOLERANCE:
+            raise ValueError(f"nominal and the shares of the scenarios add up to 1, not to {self.nominal + shared:g}")
         return self
 
 

@@ -39,7 +39,6 @@ class Record(NamedTuple):
 class Rows(NamedTuple):
     """Properties of the windows of a shard, one value per window. Scenario 0 is nominal."""
 
-    model: np.ndarray
     scenario: np.ndarray
     severity: np.ndarray
     onset: np.ndarray
@@ -53,7 +52,7 @@ def shard_file(shard: int) -> str:
 
 
 def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.random.Generator]:
-    """Draws the properties of the windows of a shard. Each scenario and each model has its share of the windows, rounded at random.
+    """Draws the properties of the windows of a shard. Each scenario has its share of the windows, rounded at random.
 
     Returns:
         The properties, the random generator of the scenarios, and the random generator of the noise.
@@ -61,12 +60,12 @@ def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.ran
     seeds = np.random.SeedSequence([_STREAM, plan.seed, shard]).spawn(4)
     mixing, placing, happening, noise = map(np.random.default_rng, seeds)
     num_rows = plan.num_windows_in(shard)
-    model = systematic([model.share for model in plan.models], num_rows, mixing)
+    systematic([1.0], num_rows, mixing)  # earlier data sets, which can be resumed, drew models here
     scenario = systematic([plan.mix.nominal, *(part.share for part in plan.mix.scenarios)], num_rows, mixing)
     ranges = np.array([((0, 0), (0, 0)), *((part.severity, part.onset) for part in plan.mix.scenarios)], float)[scenario]
     severity, onset = (ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * mixing.random((num_rows, 2))).T
     severity = severity.astype(np.float32).astype(np.float64)  # the precision of the label
-    return Rows(model, scenario, severity, onset, placing.integers(0, _START_RANGE, num_rows), placing.random(num_rows)), happening, noise
+    return Rows(scenario, severity, onset, placing.integers(0, _START_RANGE, num_rows), placing.random(num_rows)), happening, noise
 
 
 def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator) -> np.ndarray:
@@ -76,8 +75,8 @@ def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator)
     return rng.permutation(np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1]))
 
 
-def make_windows(plan: Plan, simulators: Sequence[EnhancedSimulator], shard: int) -> tuple[np.ndarray, np.ndarray, Rows]:
-    """Generates the windows of a shard with the loaded models of the plan.
+def make_windows(plan: Plan, simulator: EnhancedSimulator, shard: int) -> tuple[np.ndarray, np.ndarray, Rows]:
+    """Generates the windows of a shard with the loaded model of the plan.
 
     Returns:
         The windows, float32 of shape `(rows, samples, channels)`, a boolean array of the same shape that marks the changed samples, and the
@@ -87,19 +86,17 @@ def make_windows(plan: Plan, simulators: Sequence[EnhancedSimulator], shard: int
     shape = (len(rows.start), plan.window, len(plan.channels))
     windows, masks = np.empty(shape, np.float32), np.empty(shape, bool)
     batch = max(1, min(_BATCH, plan.shard, _BATCH_VALUES // (shape[1] * shape[2])))
-    for number, simulator in enumerate(simulators):
-        own = np.flatnonzero(rows.model == number)
-        for first in range(0, len(own), batch):
-            chosen = own[first : first + batch]
-            starts, scenarios = np.zeros(batch, np.int64), [_scenario_of(plan, rows, row) for row in chosen]
-            starts[: len(chosen)] = rows.start[chosen]
-            drawn = simulator.alignment.draw(starts, [*scenarios, *[None] * (batch - len(chosen))], happening)
-            levels = None
-            if simulator.levels is not None:
-                levels = np.zeros((batch, *simulator.levels.shape[1:]))
-                levels[: len(chosen)] = simulator.levels[(rows.level[chosen] * len(simulator.levels)).astype(int)]
-            completed = simulator.complete(drawn, levels, noise)
-            windows[chosen], masks[chosen] = (each[: len(chosen)] for each in completed)
+    for first in range(0, shape[0], batch):
+        here = slice(first, min(first + batch, shape[0]))
+        num_rows = here.stop - first
+        starts, scenarios = np.zeros(batch, np.int64), [_scenario_of(plan, rows, row) for row in range(first, here.stop)]
+        starts[:num_rows] = rows.start[here]
+        drawn = simulator.alignment.draw(starts, [*scenarios, *[None] * (batch - num_rows)], happening)
+        levels = None
+        if simulator.levels is not None:
+            levels = np.zeros((batch, *simulator.levels.shape[1:]))
+            levels[:num_rows] = simulator.levels[(rows.level[here] * len(simulator.levels)).astype(int)]
+        windows[here], masks[here] = (each[:num_rows] for each in simulator.complete(drawn, levels, noise))
     return windows, masks, rows
 
 
@@ -113,43 +110,36 @@ def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
 
 def shard_schema(settings: dict[str, Any]) -> pa.Schema:
     """Returns the Parquet schema of the shards of a data set, from `Plan.settings`."""
-    schema = window_schema(settings["window"], settings.get("channels", ("",)))
-    if len(settings["models"]) > 1:
-        schema = schema.append(pa.field("model", pa.string()))
-    return schema.with_metadata({"format": FORMAT, "settings": plan_key(settings), "interval_s": repr(settings["interval_s"])})
+    about = {"format": FORMAT, "settings": plan_key(settings), "interval_s": repr(settings["interval_s"])}
+    return window_schema(settings["window"], settings.get("channels", ("",))).with_metadata(about)
 
 
 class ShardMaker:
-    """Generates shards in one process. The models are loaded once; each call writes one file to the folder."""
+    """Generates shards in one process. The model is loaded once; each call writes one file to the folder."""
 
     def __init__(self, plan: Plan, folder: str | os.PathLike):
         self.plan, self.folder = plan, Path(folder).absolute()
         self.settings = plan.settings()  # computed on the main machine; workers on other machines must agree
 
     @functools.cached_property
-    def simulators(self) -> list[EnhancedSimulator]:
-        """The loaded models of the plan, if they are still the same, and the libraries of this machine too."""
+    def simulator(self) -> EnhancedSimulator:
+        """The loaded model of the plan, if it is still the same, and the libraries of this machine too."""
         if self.plan.settings() != self.settings:
             versions = ", ".join(f"{name} {version}" for name, version in self.settings["versions"].items())
             raise InputError(
                 f"Expected every machine to have {versions}. Received: other versions on {os.uname().nodename}. Install these."
             )
-        simulators = []
-        for model in self.plan.models:
-            simulators.append(EnhancedSimulator.load(model.folder))
-            if sha256(model.folder / MANIFEST) != model.sha256 or simulators[-1].window != model.window:
-                raise InputError(f"Expected the same model as at the start of the data set. Received: another model in {model.folder}.")
-        return simulators
+        simulator = EnhancedSimulator.load(self.plan.folder)
+        if sha256(self.plan.folder / MANIFEST) != self.plan.sha256:
+            raise InputError(f"Expected the same model as at the start of the data set. Received: another model in {self.plan.folder}.")
+        return simulator
 
     def __call__(self, shard: int) -> Record:
         """Generates a shard, writes its file atomically, and returns its record."""
-        windows, masks, rows = make_windows(self.plan, self.simulators, shard)
+        windows, masks, rows = make_windows(self.plan, self.simulator, shard)
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
         table, path = window_table(windows, masks, self.plan.channels, modes[rows.scenario], rows.severity), self.folder / shard_file(shard)
-        if len(self.plan.models) > 1:
-            names = np.array([model.name for model in self.plan.models], object)
-            table = table.append_column("model", pa.array(names[rows.model], pa.string()))
         with replace_file(path) as temporary:
-            options = parquet_options(table.schema)
-            pq.write_table(table.cast(shard_schema(self.settings)), temporary, row_group_size=_ROW_GROUP, **options)
+            schema = shard_schema(self.settings)
+            pq.write_table(table.cast(schema), temporary, row_group_size=_ROW_GROUP, **parquet_options(schema))
             return Record(shard, table.num_rows, sha256(temporary))

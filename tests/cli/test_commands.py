@@ -62,7 +62,7 @@ def world(tmp_path_factory):
     table()[["utc", "volts"]].to_csv(folder / "one.csv", index=False)
     dirty().to_csv(folder / "dirty.csv", index=False)
     pd.DataFrame({"volts": np.ones(1_500), "amps": np.arange(1_500) % 2 * 0.0}).to_csv(folder / "still.csv", index=False)
-    (folder / "mix.yaml").write_text("windows: 10\nseed: 1\nmodels: [{folder: volts}]\n")
+    (folder / "mix.yaml").write_text("windows: 10\nseed: 1\n")
     for name in ("volts", "amps"):
         small(name).save(folder / "models" / name)
     small("volts").save(folder / "single" / "volts")
@@ -456,7 +456,6 @@ WRONG = {
     "fit into a foreign folder": (["fit", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
     "no windows of a large data set": ([*GENERATE, "--workers", "1"], "--windows"),
     "scenarios in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--scenario", "stuck:0.5"], "--scenario"),
-    "models in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--channel", "volts"], "--channel"),
     "neither windows nor a length": (GENERATE, "--windows"),
     "no windows": ([*GENERATE, "--windows", "0"], "--windows 0"),
     "share out of range": ([*GENERATE, "--windows", "5", "--scenario", "stuck:0.5", "--nominal-share", "2"], "2.0"),

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
-from enhsim_tf.datasets.mix import Mix, ModelShare, ScenarioShare, make_mix, read_mix
+from enhsim_tf.datasets.mix import Mix, ScenarioShare, make_mix, read_mix
 
 DOCS = Path(__file__).parents[2] / "docs" / "large_data_sets.md"
 GOOD = {
@@ -19,7 +19,6 @@ GOOD = {
         {"mode": "stuck", "share": 0.3, "severity": [0.2, 0.9], "onset": [0, 0.5]},
         {"mode": "drift", "share": 0.2, "severity": 1},
     ],
-    "models": [{"folder": "a", "share": 0.25}, {"folder": "b/volts", "name": "second", "share": 0.75}],
 }
 
 
@@ -30,24 +29,21 @@ def written(path, content):
 
 def test_a_file_with_all_keys(tmp_path):
     scenarios = ScenarioShare("stuck", 0.3, (0.2, 0.9), (0, 0.5)), ScenarioShare("drift", 0.2, (1, 1), (0.25, 0.25))
-    models = ModelShare("a", share=0.25), ModelShare("b/volts", "second", 0.75)
-    assert read_mix(written(tmp_path / "mix.yaml", GOOD)) == Mix(0.5, scenarios, models, 1_000, 7, 100)
+    assert read_mix(written(tmp_path / "mix.yaml", GOOD)) == Mix(0.5, scenarios, 1_000, 7, 100)
 
 
 def test_optional_keys_may_be_left_out(tmp_path):
     assert read_mix(written(tmp_path / "mix.yaml", "{}")) == Mix()
-    some = {"scenarios": GOOD["scenarios"], "models": [{"folder": "a"}, {"folder": "b"}, {"folder": "c"}]}
-    mix = read_mix(written(tmp_path / "mix.yaml", some))
+    mix = read_mix(written(tmp_path / "mix.yaml", {"scenarios": GOOD["scenarios"]}))
     assert mix.nominal == pytest.approx(0.5) and mix.windows is mix.seed is mix.shard is None
-    assert mix.models == tuple(ModelShare(name, name, 1 / 3) for name in "abc")
     assert read_mix(written(tmp_path / "mix.yaml", "windows: 10_000_000\nseed:\n")).windows == 10**7
 
 
 def test_the_example_of_the_documentation_is_valid(tmp_path):
     (text,) = re.findall(r"```yaml\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
     mix = read_mix(written(tmp_path / "mix.yaml", text))
-    assert mix.windows and mix.seed is not None and len(mix.scenarios) > 2 and len(mix.models) > 1
-    for word in (*MODES, *GOOD, *GOOD["models"][1], *GOOD["scenarios"][0]):
+    assert mix.windows and mix.seed is not None and len(mix.scenarios) > 2
+    for word in (*MODES, *GOOD, *GOOD["scenarios"][0]):
         assert f"`{word}`" in DOCS.read_text(encoding="utf-8"), f"{word} is not explained"
 
 
@@ -72,7 +68,7 @@ def changed(*path, to):
 
 
 MISTAKES = {
-    "an unknown key": (changed("window", to=5), ["window", "no such key"]),
+    "an unknown key": (changed("models", to=[{"folder": "a"}]), ["models", "no such key"]),
     "an unknown key inside": (changed("scenarios", 1, "weight", to=1), ["scenarios[2].weight"]),
     "an unknown mode": (changed("scenarios", 0, "mode", to="stick"), ["scenarios[1].mode", "stuck", "stick"]),
     "no mode": (changed("scenarios", 0, "mode", to=None), ["scenarios[1].mode"]),
@@ -82,12 +78,10 @@ MISTAKES = {
     "no number": (changed("scenarios", 0, "share", to=float("nan")), ["scenarios[1].share", "nan"]),
     "true as a number": (changed("nominal", to=True), ["nominal", "True"]),
     "shares below one": (changed("nominal", to=0.4), ["add up to 1", "0.9"]),
-    "shares of models": (changed("models", 0, "share", to=0.3), ["models", "add up to 1", "1.05"]),
     "too many scenarios": (
         changed("scenarios", to=[{"mode": "stuck", "share": 0, "severity": 1} for _ in range(1_001)]),
         ["scenarios", "1000"],
     ),
-    "two models of one name": (changed("models", 1, "name", to="a"), ["same name"]),
     "a list at the top": ([1], ["keys and values"]),
     "nothing": ("", ["keys and values"]),
     "a key twice": ("seed: 1\nseed: 2\n", ["twice", "seed", "line 1"]),

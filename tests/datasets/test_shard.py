@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import write_json
 from enhsim_tf.datasets.folder import MANIFEST, check_folder
-from enhsim_tf.datasets.mix import Mix, ModelShare, ScenarioShare
+from enhsim_tf.datasets.mix import Mix, ScenarioShare
 from enhsim_tf.datasets.plan import make_plan, plan_key
 from enhsim_tf.datasets.shard import ShardMaker, draw_rows, make_windows, shard_file, shard_schema, systematic
 from tests.known_simulators import of_waves
@@ -29,7 +29,7 @@ def table_of(maker, shard):
 
 def test_each_window_agrees_with_its_labels(tmp_path):
     maker = PlainMaker(plan(200, 100, mix=ALL), tmp_path)
-    maker.__class__ = type("Silent", (PlainMaker,), {"simulators": [plain(noise_sd=0)]})
+    maker.__class__ = type("Silent", (PlainMaker,), {"simulator": plain(noise_sd=0)})
     times = INTERVAL_S * (np.arange(240)[:, None] + np.arange(WINDOW))  # all phases
     severities = []
     for shard in range(2):
@@ -60,13 +60,13 @@ def test_each_window_agrees_with_its_labels(tmp_path):
 def test_windows_have_the_levels_and_the_noise_of_their_simulator():
     levels = np.array([(10.0, 0.75), (20.0, 1.5), (30.0, 2.25)])[:, None]
     nominal = plan(600, 600, mix=Mix())
-    windows, _, _ = make_windows(nominal, [plain(0, levels=levels)], 0)
+    windows, _, _ = make_windows(nominal, plain(0, levels=levels), 0)
     at = {}
     for shift, gain in levels[:, 0]:
         inside = np.abs((windows - shift) / gain).max(axis=(1, 2)) <= 1.0001  # the unit of the coarse signal
         at[shift] = inside.sum()
     assert sum(at.values()) == 600 and min(at.values()) > 200 - 5 * np.sqrt(600 * 2 / 9)
-    noise = make_windows(nominal, [plain(0.3)], 0)[0] - make_windows(nominal, [plain(0)], 0)[0]
+    noise = make_windows(nominal, plain(0.3), 0)[0] - make_windows(nominal, plain(0), 0)[0]
     assert np.std(noise) == pytest.approx(0.3, rel=5 / np.sqrt(2 * noise.size))
 
 
@@ -74,13 +74,13 @@ def test_a_shard_depends_only_on_plan_and_number(tmp_path):
     folders = [tmp_path / name for name in ("forth", "back", "alone")]
     for folder in folders:
         folder.mkdir()
-    two = plan(230, 50, shares=(0.7, 0.3))
-    forth = [PlainMaker(two, folders[0])(shard) for shard in range(5)]
-    maker = PlainMaker(two, folders[1])
+    some = plan(230, 50)
+    forth = [PlainMaker(some, folders[0])(shard) for shard in range(5)]
+    maker = PlainMaker(some, folders[1])
     assert [maker(shard) for shard in reversed(range(5))][::-1] == forth
-    assert PlainMaker(plan(100_000, 50, shares=(0.7, 0.3)), folders[2])(3) == forth[3], "however many there are"
+    assert PlainMaker(plan(100_000, 50), folders[2])(3) == forth[3], "however many there are"
     assert len({record.sha256 for record in forth}) == 5 and [record.rows for record in forth] == [50, 50, 50, 50, 30]
-    for other in (plan(230, 50, seed=4, shares=(0.7, 0.3)), plan(230, 50), plan(230, 50, mix=ALL, shares=(0.7, 0.3))):
+    for other in (plan(230, 50, seed=4), plan(230, 50, checksum="1" * 64), plan(230, 50, mix=ALL)):
         assert PlainMaker(other, folders[2])(3) != forth[3]
 
 
@@ -101,13 +101,11 @@ def test_rare_categories_and_the_order_are_random():
 
 
 def test_the_content_of_a_shard_file(tmp_path):
-    family = plan(100, 100, shares=(0.25, 0.75))
-    maker = PlainMaker(family, tmp_path)
-    record, table = table_of(maker, 0)
+    some = plan(100, 100)
+    _, table = table_of(PlainMaker(some, tmp_path), 0)
     schema = pq.read_schema(tmp_path / shard_file(0))
-    assert list(table) == ["window", "scenario", "severity", "onset", "end", "mask", "model"]
-    assert table["model"].value_counts().to_dict() == {"model-0": 25, "model-1": 75}
-    assert schema.equals(shard_schema(family.settings())) and schema.metadata[b"settings"].decode() == plan_key(family.settings())
+    assert list(table) == ["window", "scenario", "severity", "onset", "end", "mask"]
+    assert schema.equals(shard_schema(some.settings())) and schema.metadata[b"settings"].decode() == plan_key(some.settings())
     assert np.stack(table["window"]).dtype == np.float32 and np.stack(table["window"]).shape == (100, WINDOW)
     assert [path.name for path in tmp_path.iterdir()] == ["shard-000000.parquet"]
 
@@ -134,7 +132,7 @@ def model(tmp_path_factory):
 
 def test_a_plan_holds_what_its_model_says_and_no_path(model):
     made = make_plan(Mix(), model, seed=1, num_windows=20_000)
-    assert (made.window, made.models[0].interval_s, made.models[0].name) == (60, 2.0, "volts")
+    assert (made.window, made.interval_s, made.name) == (60, 2.0, "volts")
     assert (made.shard, made.num_shards, made.num_windows_in(2)) == (8_192, 3, 20_000 - 2 * 8_192)
     assert str(model) not in json.dumps(made.settings())
 
@@ -168,18 +166,6 @@ def test_a_model_replaced_after_planning_is_refused(tmp_path, refused):
     plain(0.2).save(tmp_path / "volts")
     with refused("at the start of the data set"):
         maker(0)
-
-
-def test_models_with_different_windows_are_refused(model, tmp_path, refused):
-    of_waves([COARSE], 64, interval_s=INTERVAL_S).save(tmp_path / "wide")
-    (tmp_path / "narrow").symlink_to(model)
-    mix = Mix(models=(ModelShare("narrow", "a", 0.5), ModelShare("wide", "b", 0.5)))
-    with refused("same window", "60", "64"):
-        make_plan(mix, tmp_path, 0, 10)
-    of_waves([COARSE, COARSE], 60, interval_s=INTERVAL_S).save(tmp_path / "both")
-    mix = Mix(models=(ModelShare("narrow", "a", 0.5), ModelShare("both", "b", 0.5)))
-    with refused("same channels", "volts, amps"):
-        make_plan(mix, tmp_path, 0, 10)
 
 
 @pytest.mark.parametrize(

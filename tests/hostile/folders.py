@@ -12,16 +12,14 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.folder import JOURNAL, MANIFEST
 from enhsim_tf.datasets.mix import Mix, ScenarioShare
-from enhsim_tf.datasets.plan import FORMAT, Model, Plan
+from enhsim_tf.datasets.plan import FORMAT
 from enhsim_tf.datasets.shard import shard_file
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from tests.known_simulators import of_waves
-from tests.small_data_set import PlainMaker
+from tests.small_data_set import PlainMaker, plan
 
-PLAN = Plan(
-    Mix(0.5, (ScenarioShare("stuck", 0.5, (0.2, 0.9), (0.0, 0.5)),)), (Model("model", Path("nowhere"), 1.0, "0" * 64, 60, 2.0),), 3, 20, 10
-)
+PLAN = plan(20, 10, mix=Mix(0.5, (ScenarioShare("stuck", 0.5, (0.2, 0.9), (0.0, 0.5)),)))
 
 
 @functools.cache

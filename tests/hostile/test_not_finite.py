@@ -10,7 +10,7 @@ import pytest
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.mix import Mix
-from enhsim_tf.datasets.plan import Model, Plan
+from enhsim_tf.datasets.plan import Plan
 from enhsim_tf.datasets.shard import make_windows
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.simulator.fitting import fit
@@ -90,7 +90,7 @@ def test_what_is_not_finite_is_neither_generated_nor_scored_nor_saved(kind, whic
         lambda: simulator.generate(3),
         lambda: simulator.generate_series(200),
         lambda: score(simulator, telemetry, run, ScoreOptions(num_windows=20)),
-        lambda: make_windows(Plan(Mix(), (Model("volts", tmp_path, 1.0, "", 64, 1.0),), 0, 5, 5), [simulator], 0),
+        lambda: make_windows(Plan(Mix(), "volts", tmp_path, "", 64, 1.0, ("volts",), 0, 5, 5), simulator, 0),
     ]
     for use in uses if kind == "waves" else [*uses, lambda: list(simulator.generate_copies(RUN, 1))]:
         with refused("finite", "Fit it again"):
