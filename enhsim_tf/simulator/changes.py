@@ -37,34 +37,26 @@ def put_changes(
         tolerance: Largest difference from the nominal run that does not count as a change, shape `(channels,)`.
     """
     runs, mask = nominal.copy(), np.zeros(nominal.shape, bool)
+    weights = 0.5 + 0.5 * np.cos(np.pi * np.arange(fade + 2) / (fade + 1))  # from 1 where the degraded run is taken to 0 beyond the fade
     for begin, end in ranges:
         here = slice(max(0, begin - fade), end + fade)
-        own, inside = slice(begin - here.start, end - here.start), np.zeros(nominal[:, here].shape, bool)
+        own = slice(begin - here.start, end - here.start)
+        held = None if drawn.held is None else drawn.held[:, begin:end] - begin
+        is_held = np.False_ if held is None else held != np.arange(end - begin)[:, None]
         differs = drawn.coarse[:, begin:end] != drawn.nominal[:, begin:end]
-        if drawn.held is not None:
-            held = drawn.held[:, begin:end] - begin
-            differs &= held == np.arange(end - begin)[:, None]
-        begun, unfinished = (np.logical_or.accumulate(each, axis=1) for each in (differs, differs[:, ::-1]))
-        inside[:, own] = begun & unfinished[:, ::-1]  # from the first to the last sample that differs
-        found, changed = _cross_faded(nominal[:, here], degraded[:, here], inside, fade, tolerance)
-        if drawn.held is not None:
+        rows = (differs | is_held).any(axis=(1, 2))
+        differs, old = (differs & ~is_held)[rows], nominal[rows, here]
+        first, last = begin + differs.argmax(axis=1)[:, None], end - 1 - differs[:, ::-1].argmax(axis=1)[:, None]
+        places = np.arange(nominal.shape[1])[here, None]
+        distance = np.maximum(first - places, places - last)  # negative between the first and the last sample that differ
+        weight = weights[distance.clip(0, fade + 1)] * differs.any(axis=1)[:, None]
+        found = (old + weight * (np.asarray(degraded[rows, here], np.float64) - old)).astype(np.float32)
+        changed = np.abs(found.astype(np.float64) - old) > tolerance
+        found = np.where(changed, found, old)
+        if held is not None:
             moving = found[:, own]
-            still = np.take_along_axis(moving, held, axis=1)
+            still = np.take_along_axis(moving, held[rows], axis=1)
             stands = np.abs(moving.astype(np.float64) - still) > tolerance
             found[:, own], changed[:, own] = np.where(stands, still, moving), changed[:, own] | stands
-        runs[:, here], mask[:, here] = np.where(changed, found, runs[:, here]), mask[:, here] | changed
+        runs[rows, here], mask[rows, here] = np.where(changed, found, runs[rows, here]), mask[rows, here] | changed
     return runs, mask
-
-
-def _cross_faded(
-    nominal: np.ndarray, degraded: np.ndarray, inside: np.ndarray, fade: int, tolerance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Takes the degraded run inside and fades into the nominal one around it; the second result marks what differs."""
-    weight = inside.astype(np.float64)
-    for distance in range(1, fade + 1):
-        share = 0.5 + 0.5 * np.cos(np.pi * distance / (fade + 1))
-        weight[:, :-distance] = np.maximum(weight[:, :-distance], share * inside[:, distance:])
-        weight[:, distance:] = np.maximum(weight[:, distance:], share * inside[:, :-distance])
-    blended = (nominal + weight * (np.asarray(degraded, np.float64) - nominal)).astype(np.float32)
-    mask = np.abs(blended.astype(np.float64) - nominal) > tolerance
-    return np.where(mask, blended, nominal), mask
