@@ -19,7 +19,7 @@ from enhsim_tf.datasets.mix import MOST_WINDOWS, Mix
 from enhsim_tf.simulator.model_folder import MANIFEST
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 
-FORMAT = "enhsim_tf.datasets.generate/3"
+FORMAT = "enhsim_tf.datasets.generate/4"
 _SHARD = 8_192  # default windows per shard, for windows of up to 512 samples
 _SHARD_VALUES = 2**22  # default values per shard, for longer windows
 MOST_VALUES = 2**26  # maximum values per shard: 256 MiB, which a worker holds in memory
@@ -72,7 +72,7 @@ class Plan:
             **({"channels": self.channels} if len(self.channels) > 1 else {}),
             "nominal": self.mix.nominal,
             "scenarios": [{name: value for name, value in each.items() if value is not None} for each in scenarios],
-            "models": [{"name": self.name, "share": 1.0, "sha256": self.sha256}],  # a list, so that earlier data sets can be resumed
+            "model": {"name": self.name, "sha256": self.sha256},
             "versions": {name: importlib.metadata.version(name) for name in _VERSIONS},
         }
         return json.loads(json.dumps(settings))

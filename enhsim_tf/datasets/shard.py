@@ -60,7 +60,6 @@ def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.ran
     seeds = np.random.SeedSequence([_STREAM, plan.seed, shard]).spawn(4)
     mixing, placing, happening, noise = map(np.random.default_rng, seeds)
     num_rows = plan.num_windows_in(shard)
-    systematic([1.0], num_rows, mixing)  # earlier data sets, which can be resumed, drew models here
     scenario = systematic([plan.mix.nominal, *(part.share for part in plan.mix.scenarios)], num_rows, mixing)
     ranges = np.array([((0, 0), (0, 0)), *((part.severity, part.onset) for part in plan.mix.scenarios)], float)[scenario]
     severity, onset = (ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * mixing.random((num_rows, 2))).T

@@ -147,7 +147,7 @@ def test_a_journal_continues_after_an_incomplete_line(undisturbed, tmp_path, mon
     assert content_of(folder) == content_of(undisturbed)
 
 
-@pytest.mark.parametrize("content", [b"{", b"[]", b"\xff", b'{"format": "enhsim_tf.datasets.generate/3", "settings": {}}'])
+@pytest.mark.parametrize("content", [b"{", b"[]", b"\xff", b'{"format": "enhsim_tf.datasets.generate/4", "settings": {}}'])
 def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)
@@ -191,7 +191,7 @@ def test_a_folder_is_held_against_the_same_process_too_and_let_go_of(tmp_path, r
         (plan(2_000), ["windows", "1000", "2000"]),
         (plan(shard=100), ["shard"]),
         (plan(mix=Mix()), ["nominal"]),
-        (plan(checksum="1" * 64), ["models"]),
+        (plan(checksum="1" * 64), ["model"]),
     ],
     ids=["seed", "windows", "shard", "mix", "model"],
 )
@@ -359,7 +359,7 @@ def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, c
     assert sorted(os.listdir(tmp_path / "both")) == ["amps", "volts"]
     assert content_of(tmp_path / "both" / "volts") == content_of(tmp_path / "one")
     settings = json.loads((tmp_path / "one" / "_manifest.json").read_text())["settings"]
-    assert (settings["seed"], settings["nominal"], settings["models"][0]["name"]) == (4, 0.5, "volts")
+    assert (settings["seed"], settings["nominal"], settings["model"]["name"]) == (4, 0.5, "volts")
 
 
 # reading

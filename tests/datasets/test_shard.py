@@ -183,6 +183,6 @@ def test_data_sets_with_sizes_out_of_range_are_refused(changes, words, refused):
 
 def test_a_data_set_of_another_format_is_refused(tmp_path, refused):
     made = plan(40, 40)
-    write_json(tmp_path / MANIFEST, {"format": "enhsim_tf.datasets.generate/2", "settings": made.settings(), "shards": None})
-    with refused("generate/3", "generate/2", "another folder"):
+    write_json(tmp_path / MANIFEST, {"format": "enhsim_tf.datasets.generate/3", "settings": made.settings(), "shards": None})
+    with refused("generate/4", "generate/3", "another folder"):
         check_folder(tmp_path, made)
