@@ -157,7 +157,11 @@ def fit_or_say(
         with _failing(outcome, [name]):
             cleaned[name] = _cleaned(name, series, options.cleaning)
     outcome.lines += lines_of([each.report for each in cleaned.values()])
-    for telemetry in join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []:
+    groups = join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []
+    if len(groups) > 1:
+        others = "; ".join(spoken(each.columns) for each in groups)
+        outcome.lines.append(f"channels of other sampling intervals or times get a simulator of their own: {others}")
+    for telemetry in groups:
         with _failing(outcome, telemetry.columns):
             speaks = options.engine == "local" and not options.json
             progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if speaks else SILENT
@@ -208,4 +212,6 @@ def _save(simulator: EnhancedSimulator, report: Report, cleaned: Mapping[str, Cl
     outcome.reports[name] = found | {"folder": str(folder)}
     here = os.path.relpath(folder)
     shown = folder if here.startswith("..") else here  # from here, its full path if it is elsewhere
-    outcome.lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {shown}/{instead}"]
+    said, warned = report.lines(), len(report.warnings())
+    saved = f"{printable(name)}: simulator, report.json and report.png in {shown}/{instead}"
+    outcome.lines = [*said[:warned], *outcome.lines, *said[warned:], saved]  # warnings come first

@@ -47,6 +47,7 @@ def run_score(options: argparse.Namespace) -> int:
         found[source_names[model]] = {
             "scores": str(paths[model]),
             "detector": frame.attrs["detector"],
+            "keeps_promise": simulator.trained.get("keeps_promise", True),
             "flagged": float(frame["flag"].mean()),
             "departure": frame.attrs["departure"],
             "false_alarms_per_day": frame.attrs["false_alarms_per_day"],
@@ -55,7 +56,7 @@ def run_score(options: argparse.Namespace) -> int:
         if not options.json:
             notes = [f"{printable(model)}: {note}" for note in (run.notes if run is not None else ())]
             lines = lines_of([each.report for each in cleaned.values()])
-            tell("\n".join([*lines, *notes, *_said(frame, simulator, paths[model])]))
+            tell("\n".join([*_warning(simulator), *lines, *notes, *_said(frame, simulator, paths[model])]))
 
     code = for_each(channels, write)
     if options.json:
@@ -63,12 +64,17 @@ def run_score(options: argparse.Namespace) -> int:
     return code
 
 
+def _warning(simulator: EnhancedSimulator) -> list[str]:
+    name, trained = spoken(simulator.channels), simulator.trained
+    if trained.get("keeps_promise", True):
+        return []
+    return [
+        f"{name}: WARNING: on held-out nominal time {trained['false_alarms']:.0%} were flagged at 1 % set, so do not trust these alarms"
+    ]
+
+
 def _said(frame: pd.DataFrame, simulator: EnhancedSimulator, path: Path) -> list[str]:
-    name, trained, lines = spoken(simulator.channels), simulator.trained, []
-    if not trained.get("keeps_promise", True):
-        lines.append(
-            f"{name}: WARNING: on held-out nominal time {trained['false_alarms']:.0%} were flagged at 1 % set, so do not trust these alarms"
-        )
+    name, lines = spoken(simulator.channels), []
     if frame.attrs["departure"]:
         lines.append(f"{name}: {frame.attrs['departure']}")
     left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())

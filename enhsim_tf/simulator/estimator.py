@@ -1,4 +1,4 @@
-"""A detector with the interface of scikit-learn's outlier detectors, which runs in a `Pipeline` and in the habits of PyOD."""
+"""A detector with the interface of scikit-learn's outlier detectors, which runs in a `Pipeline`, and with what PyOD's detectors know after a fit."""
 
 from typing import Any
 
@@ -7,6 +7,7 @@ from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions
 from enhsim_tf.simulator.scoring import Scorer
@@ -34,6 +35,8 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
     def fit(self, X: np.ndarray, y: Any = None) -> "TelemetryDetector":  # noqa: N803  as scikit-learn names it
         """Fits simulator and detector to nominal telemetry of shape `(samples, channels)`; `y` is not used.
 
+        As in PyOD, `decision_scores_` and `labels_` are then the scores of the samples, higher for anomalous ones, and 1 above `threshold_`.
+
         Raises:
             InputError: If the telemetry is constant or too short.
         """
@@ -42,13 +45,22 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
         simulator, self.report_ = fit(Recording((Run(X),), names, name="telemetry"), None, FitOptions(window=self.window, seed=self.seed))
         self.simulator_ = simulator
         self.scorer_ = Scorer(simulator, ScoreOptions(self.detector, false_alarm_rate=self.false_alarm_rate, seed=self.seed))
-        self.offset_ = -1.0
+        self.offset_, self.threshold_ = -1.0, 1.0
+        self.decision_scores_ = self.scorer_.score_series(X)
+        self.labels_ = (self.decision_scores_ > self.threshold_).astype(int)
         return self
 
     def score_samples(self, X: np.ndarray) -> np.ndarray:  # noqa: N803
-        """Returns the score of each sample of telemetry with at least a window; lower is more anomalous, and below -1 is flagged."""
+        """Returns the score of each sample of telemetry; lower is more anomalous, and below -1 is flagged.
+
+        Raises:
+            InputError: If there are fewer samples than in a window.
+        """
         check_is_fitted(self)
-        return -self.scorer_.score_series(validate_data(self, X, dtype=np.float32, reset=False))
+        X, window = validate_data(self, X, dtype=np.float32, reset=False), self.simulator_.window  # noqa: N806
+        if len(X) < window:
+            raise InputError(f"Expected at least a window of {window} samples. Received: {len(X)}. Give more telemetry.")
+        return -self.scorer_.score_series(X)
 
     def decision_function(self, X: np.ndarray) -> np.ndarray:  # noqa: N803
         """Returns `score_samples` minus the threshold: negative for anomalous samples."""

@@ -52,7 +52,7 @@ class Report:
         name = spoken(self.channels)
         where = "held-out time" if self.is_held_out else "the telemetry of the fit (none was held out)"
         found = [
-            *self._warnings(),
+            *self.warnings(),
             self.coarse,
             f"windows of {self.window} samples; measured on {self.num_samples:,} samples of {where}",
             *self.notes,
@@ -66,7 +66,8 @@ class Report:
             found.append(f"range: {self.outside:.1%} of that time are outside the training range of the coarse columns")
         return [f"{name}: {printable(line)}" for line in found if line]
 
-    def _warnings(self) -> list[str]:
+    def warnings(self) -> list[str]:
+        """Returns what should keep a reader from trusting the simulator, the first of `lines`."""
         found = []
         if not self.keeps_promise:
             (alarms,) = [each["false_alarms"] for each in self.detectors if each["name"] == self.detector]

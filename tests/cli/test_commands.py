@@ -249,6 +249,22 @@ def test_score_gives_every_sample_a_score_and_a_flag(fitted, told, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"scores.csv", "scores.events.csv", "scores.png"}
 
 
+def test_a_promise_that_is_not_kept_comes_first_and_is_in_the_json(told, tmp_path):
+    simulator = small("volts")
+    simulator.trained |= {"keeps_promise": False, "false_alarms": 0.5, "detector": "limit check"}
+    simulator.save(tmp_path / "volts")
+    words = ("score", "volts", "WORLD/one.csv", "--windows", 30, "--out", "scores.csv")
+    assert told(*words)[1].startswith("volts: WARNING: on held-out nominal time 50% were flagged")
+    assert json.loads(told(*words, "--json")[1])["volts"]["keeps_promise"] is False
+
+
+def test_channels_of_other_rates_get_a_simulator_of_their_own_and_the_fit_says_so(told, tmp_path):
+    table().assign(amps=table()["amps"].where(np.arange(1_500) % 2 == 0)).to_csv(tmp_path / "two.csv", index=False)
+    code, out, errors = told("fit", "two.csv", "--max-fill", 0, "--out", "models", *TINY)
+    assert (code, errors) == (0, []) and "times get a simulator of their own: volts; amps" in out
+    assert set(models_of(tmp_path / "models")) == {"volts", "amps"}
+
+
 def test_update_keeps_the_old_simulator_and_replaces_one_only_if_asked(fitted, told, tmp_path):
     before = files(fitted[0])
     command = ["update", fitted[0], "WORLD/one.csv", "--out", "new"]

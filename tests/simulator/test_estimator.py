@@ -16,3 +16,12 @@ def test_it_runs_in_a_pipeline_and_finds_a_fault():
     decision, samples = pipeline.decision_function(new), pipeline.score_samples(new)
     np.testing.assert_array_equal(flagged, decision < 0)
     np.testing.assert_allclose(decision, samples + 1)
+    fitted = pipeline[-1]
+    np.testing.assert_array_equal(fitted.decision_scores_, -pipeline.score_samples(nominal))
+    np.testing.assert_array_equal(fitted.labels_, pipeline.predict(nominal) == -1)
+
+
+def test_fewer_samples_than_a_window_are_refused(refused):
+    detector = TelemetryDetector(window=80, detector="largest step").fit(joint(1_500).parts[0].values)
+    with refused("window of 80 samples", "50"):
+        detector.predict(joint(50).parts[0].values)
