@@ -215,7 +215,7 @@ def refuse_days(values: np.ndarray, what: str, even_whole: bool = False) -> None
 
 def _refuse_two_meanings(values: np.ndarray, what: str) -> None:
     """Refuses numbers that may be seconds, or dates such as 20240301, decimal years, times of day such as 120059, or ms of a run."""
-    low, high, is_whole = values.min(), values.max(), (values % 1 == 0).all()
+    low, high, is_whole = values.min(), values.max(), (values == np.floor(values)).all()
     is_of_day = 1e4 <= low and high < 24e4 and low // 100 < high // 100 and max((values % 100).max(), (values // 100 % 100).max()) < 60
     is_fine = is_whole and 0 < low < 1.2e9 and (step := np.median(np.diff(values))) >= 1_000 and step % 60 > 0
     kinds = {"decimal years": 1900 <= low and high < 2100, "hhmmss": is_of_day, "ms or us (time_format 'ms' or 'us')": is_fine}
