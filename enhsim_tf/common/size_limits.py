@@ -41,7 +41,7 @@ def load_npy(path: str | os.PathLike) -> np.ndarray:
         mapped.close()
         raise ValueError("an archive")
     if mapped.dtype.kind in "SUV":  # text, bytes and records, whose elements may have no size
-        raise ValueError(f"dtype {mapped.dtype}, no numbers")
+        raise ValueError(f"dtype {mapped.dtype}, no numbers; save records as a table")
     return np.array(mapped)
 
 

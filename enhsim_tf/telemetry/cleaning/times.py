@@ -20,16 +20,17 @@ from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Places
 
 UNIT_NAMES = {"D": "days", "h": "hours", "min": "minutes", "s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 _DAY_NAMES = {"excel": "days of spreadsheets", "mjd": "modified Julian dates", "jd": "Julian dates", "datenum": "MATLAB's day numbers"}
-_YEARS_S = (3.1e8, 4.2e9)  # seconds since 1970 in the years 1979 to 2103
+_YEARS_S = (3.1e8, 3.4e9)  # seconds since 1970 in the years 1979 to 2077; later ones count from 1900 or 1904
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
 DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
 """Pattern of a time span as text, such as `0.5 sec` and `1 days 00:00:01`."""
 _ISO = "ISO8601"
+_MIDNIGHT = r"(?<=[T ])24(?=:00)"  # at the end of a day
 LOOK = 200  # number of cells that are inspected to find a form
 _TIME = r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>\.\d+)?)?)(?P<half> ?[AaPp][Mm])?"
 _END = rf"(?:(?P<gap>[T:]|,? +){_TIME})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
 _DAY_OF_YEAR = re.compile(rf"\d{{4}}(?P<mark>[-/:. ]?)\d{{3}}{_END}")
-_DAY_MONTH = re.compile(rf"(?P<first>\d\d?)(?P<mark>[./-])(?P<second>\d\d?)(?P=mark)\d{{4}}{_END}")
+_DAY_MONTH = re.compile(rf"\d\d?(?P<mark>[./-])\d\d?(?P=mark)\d\d(?P<century>\d\d)?{_END}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,8 +152,8 @@ class _Reader:
         forms = [form] if is_format else date_forms(text.dropna())
         if len(forms) > 1:
             raise InputError(
-                f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {self.what}, where both are at most "
-                f"12 throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
+                f"Expected dates whose day, month and year can be told apart. Received: {format_cell(given.iloc[0])} in "
+                f"{self.what}. Give time_format {' or '.join(map(repr, forms))} (--time-format)."
             )
         return self._of_dates_as_text(cells, text, missing, forms[0] if forms else _ISO)
 
@@ -212,29 +213,39 @@ def refuse_days(values: np.ndarray, what: str, even_whole: bool = False) -> None
     )
 
 
+def _refuse_two_meanings(values: np.ndarray, what: str) -> None:
+    """Refuses numbers that may be seconds, or dates such as 20240301, decimal years, times of day such as 120059, or ms of a run."""
+    low, high, is_whole = values.min(), values.max(), (values == np.floor(values)).all()
+    is_of_day = 1e4 <= low and high < 24e4 and low // 100 < high // 100 and max((values % 100).max(), (values // 100 % 100).max()) < 60
+    is_fine = is_whole and 0 < low < 1.2e9 and (step := np.median(np.diff(values))) >= 1_000 and step % 60 > 0
+    kinds = {"decimal years": 1900 <= low and high < 2100, "hhmmss": is_of_day, "ms or us (time_format 'ms' or 'us')": is_fine}
+    for digits, form in ((7, "%Y%j"), (8, "%Y%m%d"), (10, "%Y%m%d%H"), (12, "%Y%m%d%H%M"), (14, "%Y%m%d%H%M%S")):
+        if is_whole and 1.9 * 10 ** (digits - 1) <= low and high < 2.2 * 10 ** (digits - 1):
+            text = pd.Series(values[:1_000].astype(np.int64).astype(str))
+            kinds[f"dates (time_format {form!r})"] = pd.to_datetime(text, format=form, errors="coerce").notna().all()
+    if kind := next((kind for kind, found in kinds.items() if found), None):
+        raise InputError(
+            f"Expected times whose unit is known. Received: {values[0]:.17g} to {values[-1]:.17g} in {what}, which may be {kind} "
+            "or seconds (time_format 's'). Give time_format (--time-format), or write the times as dates."
+        )
+
+
 def _infer_unit(values: np.ndarray, what: str) -> str:
     size = float(np.median(np.abs(values))) if len(values) else 0.0
-    if len(values) and (values == np.floor(values)).all():
-        for digits, form in ((7, "%Y%j"), (8, "%Y%m%d"), (10, "%Y%m%d%H"), (12, "%Y%m%d%H%M"), (14, "%Y%m%d%H%M%S")):
-            if 1.9 * 10 ** (digits - 1) <= values.min() and values.max() < 2.2 * 10 ** (digits - 1):
-                text = pd.Series(values[:1_000].astype(np.int64).astype(str))
-                if pd.to_datetime(text, format=form, errors="coerce").notna().all():
-                    raise InputError(
-                        f"Expected dates as text or times as numbers. Received: {text.iloc[0]} in {what}, which reads as both. "
-                        f"Give time_format {form!r}, or 's' (--time-format)."
-                    )
+    if len(values) > 1:
+        _refuse_two_meanings(values, what)
     refuse_days(values, what)
     unit = "s" if size < _YEARS_S[0] else epoch_unit(size)
     if unit is not None:
         return unit
     raise InputError(
-        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in {what}, which are not from 1980 to 2100 in any of "
+        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in {what}, which are not from 1980 to 2077 in any of "
         "these units. Give time_format, such as 'ms' (--time-format)."
     )
 
 
 def epoch_unit(size: float) -> str | None:
-    """Returns the unit in which a number is a time since 1970 from the years 1979 to 2103, or None."""
+    """Returns the unit in which a number is a time since 1970 from the years 1979 to 2077, or None."""
     units = ("s", "ms", "us", "ns")[: 3 if 6.3e17 < size < 6.5e17 else 4]  # not .NET's steps of 100 ns since the year 1
     return next((unit for unit in units if _YEARS_S[0] <= size * UNITS_NS[unit] / 1e9 <= _YEARS_S[1]), None)
 
@@ -253,22 +264,22 @@ def date_forms(text: pd.Series) -> list[str]:
         if found := _DAY_OF_YEAR.fullmatch(cell):
             return [f"%Y{found['mark']}%j{_end(found)}"] if found["mark"] or found["time"] else []
         if found := _DAY_MONTH.fullmatch(cell):
-            return [f"{order.replace('-', found['mark'])}{_end(found)}" for order in _orders(text, found["mark"])]
-        if re.search(r"[A-Za-z]{3}", cell) and (form := guess_datetime_format(cell)) and "%Y" in form and "%d" in form:
+            year, mark = "Y" if found["century"] else "y", found["mark"]
+            return [order.replace("-", mark) + _end(found) for order in _orders(text, mark, year)]
+        if re.search(r"[A-Za-z]{3}|^\d{4}[/.]", cell) and (form := guess_datetime_format(cell)) and "%Y" in form and "%d" in form:
             return [form]
-        if found := re.fullmatch(rf"\d\d?/[A-Z][a-z]{{2}}/\d{{4}}{_END}", cell):  # of web servers
-            return [f"%d/%b/%Y{_end(found)}"]
-        if re.fullmatch(rf"\d{{4}}(?P<mark>[/.])\d\d?(?P=mark)\d\d?{_END}", cell) and (form := guess_datetime_format(cell)):
-            return [form]
+        if found := re.fullmatch(rf"\d\d?(?P<mark>[/-])[A-Za-z]{{3}}(?P=mark)\d\d(?P<century>\d\d)?{_END}", cell):
+            return [f"%d-%b-%{'Y' if found['century'] else 'y'}".replace("-", found["mark"]) + _end(found)]
     return []
 
 
-def _orders(text: pd.Series, mark: str) -> list[str]:
-    """Returns the orders of day and month that all dates allow; with points, the day comes first."""
+def _orders(text: pd.Series, mark: str, year: str) -> list[str]:
+    """Returns the orders of day, month and year that all dates allow; with points, the day comes first."""
     days = pd.Series(text.str[:12].unique(), dtype="str")  # far fewer than rows
-    parts = days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}").dropna().astype(int)
-    largest = parts.max()
-    orders = [order for order, which in (("%d-%m-%Y", 1), ("%m-%d-%Y", 0)) if largest[which] <= 12]
+    largest = days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}(\d\d)").dropna().astype(int).max()
+    orders = [f"%d-%m-%{year}", f"%m-%d-%{year}", *(["%y-%m-%d"] if year == "y" else [])]
+    most = {"%m": 12, "%d": 31}
+    orders = [order for order in orders if all(part <= most.get(kind, 99) for part, kind in zip(largest, order.split("-"), strict=True))]
     return orders[:1] if mark == "." else orders
 
 
@@ -302,9 +313,11 @@ def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
     left = (dates.isna() & text.notna()).to_numpy()
     if left.any():
         rest = _plain(text[left].astype(str))
+        late = pd.to_timedelta(rest.str.contains(_MIDNIGHT).astype(int), unit="D")
+        rest = rest.str.replace(_MIDNIGHT, "00", regex=True)
         whole = form.replace(".%f", "")
         for other in dict.fromkeys((form, whole, whole.replace("%S", "%S.%f"))):
-            found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None)
+            found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None) + late
             unit = np.promote_types(dates.dtype, found.dtype)  # whole seconds and fractions have different units
             dates = dates.astype(unit).fillna(found.astype(unit))
         zoned[left] = _has_zone(rest, form)
@@ -352,14 +365,16 @@ def refuse_restart(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, nam
 def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
     """Refuses times that step back by about one hour only, as a local clock does: without its zone, sorting would mix the two hours.
 
+    So are times that step back by a day to where there were none, as where the date of the first day stays past midnight.
     `times` are nanoseconds in the order of the source, and `numbers` their rows there.
     """
     steps, hour = np.diff(times), UNITS_NS["h"]
     usual = np.median(np.abs(steps)) if len(steps) else 0
     back = np.flatnonzero(steps < 0)
-    if len(back) and usual < hour / 2 and (np.abs(steps[back] + hour) <= 2 * usual).all():
-        place = log.place(numbers[back[0] + 1])
+    is_hour, is_day = (np.abs(steps[back] + span) <= 2 * usual for span in (hour, UNITS_NS["D"]))
+    if len(back) and usual < hour / 2 and (is_hour.all() or is_day.all() and len(np.unique(times)) == len(times)):
+        step = "one hour, as local clocks do," if is_hour.all() else "one day, as where a date stays past midnight,"
         raise InputError(
-            f"Expected ascending times, or their time zone. Received: times without a zone that step back by one hour at {place} of {name}, "
-            "as local clocks do. Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)."
+            f"Expected ascending times, or their time zone. Received: times without a zone that step back by {step} at "
+            f"{log.place(numbers[back[0] + 1])} of {name}. Correct them, or give timezone (--timezone Europe/Berlin, or UTC to take them as is)."
         )

@@ -26,7 +26,7 @@ _SAID = {
 }
 _KEYS = set(
     "host hostname sensor sensorid device deviceid node tag tagname channel channelname parameter param signal variable metric field series "
-    "measurement point pointname station machine asset entity source location site name id copy table result item object".split()
+    "measurement point pointname station machine asset entity source location site name id copy table result item object unit".split()
 )
 _FIRST = ("_field", "field", "series", "metric", "parameter", "signal", "variable", "sensor", "channel", "tag")
 _MAX_SERIES = 500  # values of a column that tells series apart unasked

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.numbers import is_text
 from enhsim_tf.telemetry.cleaning.options import UNITS_NS
 from enhsim_tf.telemetry.cleaning.times import Times, epoch_unit, refuse_days
 
@@ -22,7 +23,7 @@ _TIMES = set(
 )
 _BESIDE = set(
     "since start of run the from local gmt cet sim simulation simulated mission rel relative abs absolute system sample sampling event log logger "
-    "record recorded received created at in begin experiment test server gps day julian modified excel serial number".split()
+    "record recorded received created at in begin boot experiment test server day julian modified excel serial number".split()
 )
 _UNITS = {
     "D": "d day days tage",
@@ -44,8 +45,12 @@ _PARTS = {
     "hour": "hour hr hh stunde",
     "minute": "minute min mn",
     "second": "second sec ss sekunde sod secondofday",
+    "ms": _UNITS["ms"],
 }
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
+_MOST = {"hour": 24, "minute": 59, "ms": 999}  # of a time of day
+_ZONE = re.compile(r"\b(?:[A-Z][a-z]+/[A-Z]\w+|CES?T|MES?Z|BST|JST|[ECMP][SD]T)\b")
+_ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
 
 
 class Clock(NamedTuple):
@@ -62,7 +67,7 @@ def words_of(name: str) -> list[str]:
 
 def _name_tells(name: str) -> tuple[int, str | None]:
     """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit or kind of days that it states."""
-    if name.casefold().strip() == "x_value":  # of LabVIEW
+    if name.casefold().strip() in ("x_value", "x-axis"):  # of LabVIEW and of oscilloscopes
         return 2, None
     words = words_of(name)
     lower = [word.casefold() for word in words]
@@ -108,7 +113,7 @@ def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[s
     dates, hours, spans = _varying(of_kind["dates"], frame), of_kind["times of day"], of_kind["spans"]
     named = [name for name in numbers if tells[name] == 2]
     compact = [name for name in named if _are_compact_dates(numbers[name])]
-    if (joined := _joined(frame, hours, dates or compact, numbers)) is not None:
+    if (joined := _joined(frame, kinds, dates or compact, numbers)) is not None:
         return joined
     if dates:
         return _one_of([name for name in dates if tells[name]] or dates, frame, what)
@@ -156,12 +161,13 @@ def _one_of(names: list[str], frame: pd.DataFrame, what: str) -> Clock:
 
 def _refuse_unknown(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str) -> None:
     """Refuses a column that may be a clock of which neither name nor form is known."""
-    ramp = next((name for name, values in numbers.items() if _is_regular(values)), None)
+    in_order = (name for name, each in numbers.items() if is_epoch(each) and np.ptp(each) > 0 <= np.diff(each).min())
+    ramp = next((name for name, values in numbers.items() if _is_regular(values)), next(in_order, None))
     if ramp is not None and sum(kind == "numbers" for kind in kinds.values()) > 1:
         step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
         raise InputError(
-            f"Expected to know the clock. Received: {ramp!r} of {what}, which increases in equal steps of {step:g}, as a clock "
-            f"or a counter does. Give --time {_quoted(ramp)} (with --time-format ms or another unit if it does not count seconds), or --time none."
+            f"Expected to know the clock. Received: {ramp!r} of {what}, which increases in steps of {step:g}, as a clock or a "
+            f"counter does. Give --time {_quoted(ramp)} (with --time-format ms or another unit if it does not count seconds), or --time none."
         )
     for name in (name for name, kind in kinds.items() if kind == "words"):
         cells = frame[name].dropna().astype("str").iloc[:1_000]
@@ -187,10 +193,18 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
     return form
 
 
-def offset_of(clock: Clock) -> pd.Timedelta | None:
-    """Returns the offset from UTC that the name of a clock states, such as `Date Time, GMT+02:00`, or None."""
-    found = re.search(r"(?<!Etc/)\b(?:UTC|GMT) ?([+-]\d\d?)(?::?(\d\d))?\b", " ".join(clock.columns))
-    return pd.Timedelta(f"{found[1]}:{found[2] or '00'}:00") if found else None
+def offset_of(clock: Clock, frame: pd.DataFrame, zone: str | None, what: str) -> pd.Timedelta | None:
+    """Returns the offset in a clock's name, as in `Time, GMT+02:00`, or None; refuses other statements of a zone, unless `zone` is given."""
+    named = " ".join(clock.columns)
+    if found := re.search(r"(?<!Etc/)\b(?:UTC|GMT) ?([+-]\d\d?)(?::?(\d\d))?\b", named):
+        return pd.Timedelta(f"{found[1]}:{found[2] or '00'}:00")
+    beside = [name for name in frame if _ZONE_COLUMN.search(name) or name.casefold() == "tz" and is_text(frame[name])]
+    if zone is None and (_ZONE.search(named) or beside and "utc" not in named.casefold()):
+        raise InputError(
+            f"Expected times that state their zone. Received: {', '.join(dict.fromkeys([named, *beside]))} in {what}, where a zone is named "
+            "that is not read. Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)."
+        )
+    return None
 
 
 def further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], kinds: Mapping[str, str]) -> set[str]:
@@ -236,17 +250,30 @@ def _are_compact_dates(values: np.ndarray) -> bool:
     return bool(pd.to_datetime(pd.Series(np.unique(values)).astype(np.int64).astype(str), format="%Y%m%d", errors="coerce").notna().all())
 
 
-def _joined(frame: pd.DataFrame, hours: list[str], dates: list[str], numbers: Mapping[str, np.ndarray]) -> Clock | None:
-    """Returns the clock that a column of dates, one of times of day, and perhaps one of milliseconds make together, or None."""
-    if len(dates) != 1 or len(hours) != 1 or not _has_no_time(frame[dates[0]]):
+def _joined(frame: pd.DataFrame, kinds: Mapping[str, str], dates: list[str], numbers: Mapping[str, np.ndarray]) -> Clock | None:
+    """Returns the clock that a column of dates and columns of the time of day, in text or whole numbers, make together, or None."""
+    hours, digits = [name for name in kinds if kinds[name] == "times of day"], {}
+    if len(dates) != 1 or len(hours) > 1:
         return None
-    cells = frame[dates[0]]
-    day = cells.dt.strftime("%Y-%m-%d") if pd.api.types.is_datetime64_any_dtype(cells.dtype) else cells.astype("str").str.strip()
-    joined, columns = day + " " + frame[hours[0]].astype("str").str.strip(), (dates[0], hours[0])
     for name, values in numbers.items():
-        if _UNIT_OF.get(name.casefold()) == "ms" and ((values >= 0) & (values < 1_000) & (values % 1 == 0)).all():
-            return Clock((*columns, name), joined + "." + pd.Series(values).map("{:03.0f}".format))
-    return Clock(columns, joined)
+        part = _PART_OF.get(name.casefold())
+        if part in _MOST and ((values >= 0) & (values <= _MOST[part]) & (values % 1 == 0)).all():
+            digits[part] = pd.Series(values, name=name).map(f"{{:0{len(str(_MOST[part]))}.0f}}".format)
+    cells, pieces = frame[dates[0]], [(".", digits["ms"])] if "ms" in digits else []
+    if not (is_day := _has_no_time(cells)):
+        pieces = pieces if is_text(cells) and cells.dropna().iloc[:200].astype("str").str.fullmatch(r".*:\d\d:\d\d").all() else []
+    elif hours:
+        halves = [name for name, kind in kinds.items() if kind == "words" and frame[name].dropna().isin(["AM", "PM"]).all()]
+        pieces = [(" ", frame[name].astype("str").str.strip()) for name in (*hours, *halves[:1])] + pieces
+    elif "hour" in digits:
+        pieces = [(" ", digits["hour"]), (":", digits.get("minute", digits["hour"].mask(digits["hour"].notna(), "00")))]
+    if not pieces:
+        return None
+    day = cells.dt.strftime("%Y-%m-%d") if pd.api.types.is_datetime64_any_dtype(cells.dtype) else cells.astype("str").str.strip()
+    joined = day.ffill() if is_day else day  # a date may stand in the first row of each day only
+    for mark, piece in pieces:
+        joined += mark + piece
+    return Clock(tuple(dict.fromkeys([dates[0], *(piece.name for _, piece in pieces)])), joined)
 
 
 def _has_no_time(cells: pd.Series) -> bool:
@@ -275,7 +302,7 @@ def _date_parts(frame: pd.DataFrame, numbers: Mapping[str, np.ndarray]) -> Clock
         return None
     days = {part: first if "doy" in found else values.get(part, first) for part in ("month", "day")}
     stamps = pd.to_datetime({"year": values["year"]} | days, errors="coerce").astype("datetime64[ns]")
-    for part, unit in (("doy", "D"), ("hour", "h"), ("minute", "min"), ("second", "s")):
+    for part, unit in (("doy", "D"), ("hour", "h"), ("minute", "min"), ("second", "s"), ("ms", "ms")):
         if part in found:
             stamps += pd.to_timedelta(values[part] - (part == "doy"), unit=unit)
     return Clock(tuple(found[part] for part in _PARTS if part in found), stamps.dt.round("ms"))

@@ -48,8 +48,6 @@ def decode(content: bytes) -> tuple[str, str, list[Finding]]:
             is_simple = b"\x00" not in content and content.isascii() and b"\n" in content
             text, encoding = whole[: _HEAD if is_simple else None].decode("utf-8-sig"), "utf-8"  # with or without a byte order mark
         except UnicodeDecodeError:
-            if b"\x00" in whole:
-                raise ValueError("it is not text") from None
             text, encoding = whole.decode("cp1252", "replace"), "cp1252"
             findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Windows-1252"))
     if "\x00" in text:
@@ -116,10 +114,13 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
     if widths.count(width) < 0.6 * len(widths):
         return None
     sample = [row for row in last if len(row) == width]
+    counts = [str(number) for number in range(width)]
     solid = [place for place in range(min(width, _LOOK)) if _is_solid(sample, place)]
 
     def share(row: list[str]) -> float:
-        """Share of the columns of numbers and dates that hold one in this row."""
+        """Share of the columns of numbers and dates that hold one in this row, none if its cells are names that count, as in `,0,1`."""
+        if len(row) > 1 and row[1:] in (counts[: len(row) - 1], counts[1 : len(row)]) and not _SOLID.match(row[0]):
+            return 0.0
         return sum(place < len(row) and bool(_SOLID.match(row[place])) for place in solid) / max(1, len(solid))
 
     begin = next((number for number, row in enumerate(rows) if len(row) == width and share(row) > 0.5), None)
@@ -138,6 +139,8 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
     if block < top and not no_header:
         header = max(range(block, top), key=lambda number: (len({cell for cell in rows[number] if cell}), -number))
         given = rows[header]
+        if mark == BLANKS and 1 < len(given) == width - 1 and ":" in rows[begin][1]:  # a date and a time of day below one name
+            given = ["", *given]
         short = width - len(given)
         if short and any(row[len(given) :] != [""] * short for row in sample):
             return None

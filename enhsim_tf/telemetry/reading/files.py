@@ -104,17 +104,12 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
         if sum(member.file_size for member in archive.infolist()) > limit:
             raise ValueError(f"more than {limit:,} bytes when unpacked; save the sheet as CSV")
     stream.seek(0)
-    try:
-        book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
-        rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]
-        if len(book.worksheets) > 1:
-            findings.append(Finding("files", 1, f"only the first sheet was read: {book.worksheets[0].title}"))
-    except openpyxl.utils.exceptions.InvalidFileException as error:
-        raise ValueError(short_reason(error)) from None
+    book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
+    rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]
+    if len(book.worksheets) > 1:
+        findings.append(Finding("files", 1, f"only the first sheet was read: {book.worksheets[0].title}"))
     width = max((place + 1 for row in rows for place, cell in enumerate(row) if cell is not None), default=0)
     cells = [["" if cell is None else str(cell).replace("\n", " ") for cell in row[:width]] for row in rows[:100]]
-    if not any(any(row) for row in cells):
-        raise ValueError("it is empty")
     text = "\n".join("\t".join(cell.replace("\t", " ").replace('"', "'") for cell in row) if any(row) else "" for row in cells)
     dialect = find_dialect(text, name, options.no_header, "\t")
     frame = pd.DataFrame([row[:width] for row in rows[dialect.first_line :]]).infer_objects()
