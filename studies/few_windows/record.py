@@ -20,8 +20,9 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise.candidates import fit_candidate
+from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, time_blocks
+from enhsim_tf.telemetry.windows import evenly_spaced_starts, time_blocks
 
 REAL, CORAL = "real", "CORAL"
 SIMULATOR = "simulator + "
