@@ -2,8 +2,8 @@
 
 A detector has `fit(windows)`, which learns what is nominal and returns the detector, and `score(windows)`, which returns one score for each
 window; higher is more anomalous. Its threshold is chosen by the caller, with `metrics.threshold`. Windows have the shape
-`(windows, samples)` or `(windows, samples, channels)`; several channels are given in units of their standard deviations. `registry` lists all
-detectors by name.
+`(windows, samples, channels)`; several channels are given in units of their standard deviations. Where windows are seen channel by channel, a
+single channel may do without its axis. `registry` lists all detectors by name.
 """
 
 import numpy as np
@@ -21,19 +21,12 @@ _MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` 
 
 def flat(windows: np.ndarray) -> np.ndarray:
     """Windows with the channels one after the other, shape `(windows, channels * samples)`."""
-    return windows if windows.ndim == 2 else windows.transpose(0, 2, 1).reshape(len(windows), -1)
+    return windows.swapaxes(1, -1).reshape(len(windows), -1)
 
 
 def features(windows: np.ndarray) -> np.ndarray:
     """The features of `window_features` of each channel."""
-    if windows.ndim == 2:
-        return window_features(windows)
-    return np.concatenate([window_features(windows[:, :, channel]) for channel in range(windows.shape[2])], axis=1)
-
-
-def _with_channels(windows: np.ndarray) -> np.ndarray:
-    """Windows of shape `(windows, samples, channels)` in 64 bits."""
-    return np.asarray(windows if windows.ndim == 3 else windows[:, :, None], np.float64)
+    return window_features(windows.swapaxes(1, -1).reshape(-1, windows.shape[1])).reshape(len(windows), -1)
 
 
 class LimitCheck:
@@ -47,7 +40,7 @@ class LimitCheck:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest distance outside the limits, in the unit of the telemetry; within them, minus the remaining margin."""
         beyond = np.maximum(self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1])
-        return beyond if windows.ndim == 2 else beyond.max(axis=1)
+        return beyond.reshape(len(windows), -1).max(axis=1)
 
 
 class PCAResidual:
@@ -111,7 +104,7 @@ class JointMeans:
         return np.einsum("wi,ij,wj->w", apart, self._precision, apart) / apart.shape[1]
 
     def _means(self, windows: np.ndarray) -> np.ndarray:
-        values = _with_channels(windows)
+        values = np.asarray(windows, np.float64)
         parts = np.array_split(values, min(self.num_parts, values.shape[1]), axis=1)
         return np.concatenate([part.mean(axis=1, dtype=np.float64) for part in parts], axis=1)
 
@@ -170,7 +163,7 @@ class Innovation:
 
     def fit(self, windows: np.ndarray) -> "Innovation":
         """Fits the prediction and the covariance of its errors to nominal windows."""
-        values = _with_channels(windows)
+        values = np.asarray(windows, np.float64)
         self._mean, order = values.mean(axis=(0, 1)), max(1, min(self.order, values.shape[1] // 4))
         number = max(1, _MOST_ROWS // (values.shape[1] - order))
         centred = (values - self._mean)[np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)]
@@ -188,7 +181,7 @@ class Innovation:
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the mean square of the weighed errors of each window, about the number of channels for nominal ones."""
-        values = _with_channels(windows) - self._mean
+        values = np.asarray(windows, np.float64) - self._mean
         order, channels = len(self._weights) // values.shape[2], values.shape[2]
         kernels = self._weights.reshape(channels, order, channels).astype(np.float32)  # input, lag from the oldest, output
         scores = np.empty(len(values))
@@ -230,4 +223,4 @@ class ResidualSize:
 
 def root_mean_square(windows: np.ndarray) -> np.ndarray:
     """Returns the root-mean-square of each window, float64 of shape `(windows,)`."""
-    return np.sqrt(np.mean(np.asarray(windows, np.float64) ** 2, axis=1))
+    return np.sqrt(np.mean(np.asarray(flat(windows), np.float64) ** 2, axis=1))

@@ -76,7 +76,6 @@ def choose_enhancer(
     Raises:
         InputError: If the name is unknown, or there is too little time.
     """
-    inputs, targets = _with_channels(inputs), _with_channels(targets)
     window = inputs.shape[1]
     edges = block_edges(int(starts.min()), int(starts.max()) + window, window)
     rows, held_out = split_fold(starts, window, edges, fold=0)
@@ -138,7 +137,7 @@ def fit_enhancer(
     Raises:
         InputError: If the name is unknown, or the training diverges.
     """
-    return _Training(_with_channels(inputs), _with_channels(targets), starts, penalties).fit(name, seed, epochs)
+    return _Training(inputs, targets, starts, penalties).fit(name, seed, epochs)
 
 
 class _Training:
@@ -232,12 +231,6 @@ def _deviations(windows: np.ndarray) -> np.ndarray:
     """Standard deviation of each column, 1 where it is only rounding, shape `(columns,)`."""
     deviation = np.std(windows, axis=(0, 1), dtype=np.float64)
     return np.where(deviation > 1e-6 * np.abs(windows).max(axis=(0, 1), initial=0), deviation, 1.0)
-
-
-def _with_channels(windows: np.ndarray) -> np.ndarray:
-    """Adds the axis of columns or channels if it is missing."""
-    windows = np.asarray(windows)
-    return windows[:, :, None] if windows.ndim == 2 else windows
 
 
 def block_edges(begin: int, end: int, window: int) -> np.ndarray:

@@ -32,7 +32,7 @@ class Ridge:
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
         """Predicts the targets of windows as in training, float32 of shape `(windows, outputs)`."""
-        mapped = (_with_columns(inputs) - self.input_mean).reshape(len(inputs), -1)
+        mapped = np.asarray(inputs, np.float64).reshape(len(inputs), -1) - self.input_mean.ravel()
         for factor in self.factors:
             mapped = mapped @ factor
         return (self.target_mean + mapped).astype(np.float32)
@@ -70,7 +70,7 @@ def fit_ridge(
     windows, targets, starts = _checked(inputs, targets, starts)
     if chosen is None:
         chosen = _choose_penalties(windows, targets, starts, np.asarray(penalties, np.float64), num_channels)
-    solution, each = _Solution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
+    solution, each = RidgeSolution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
     left, right = solution.basis / solution.scale[:, None], solution.coefficients(each)
     is_low_rank = left.size + right.size < len(left) * right.shape[1]
     factors = (left, right) if is_low_rank else (left @ right,)
@@ -83,7 +83,7 @@ def _choose_penalties(
     """Returns the penalty of each channel with the least error on held-out blocks of time; of a single window, the largest."""
     squares, power = np.zeros((len(penalties), num_channels)), np.zeros(num_channels)
     for training, held_out in time_blocks(starts, _NUM_BLOCKS, windows.shape[1]):
-        solution = _Solution(windows[training], targets[training])
+        solution = RidgeSolution(windows[training], targets[training])
         inner, centred = solution.project(windows[held_out]), targets[held_out] - solution.target_mean
         power += _by_channel((targets[held_out] - targets.mean(axis=0)) ** 2, num_channels)
         for number, penalty in enumerate(penalties):
@@ -97,8 +97,8 @@ def _by_channel(squares: np.ndarray, num_channels: int) -> np.ndarray:
     return squares.sum(axis=0).reshape(-1, num_channels).sum(axis=0)
 
 
-class _Solution:
-    """Ridge regression at every penalty, from one eigendecomposition.
+class RidgeSolution:
+    """Ridge regression at every penalty, from one eigendecomposition; windows and targets are those of `fit_ridge`, in float64.
 
     The smaller of the two Gram matrices is decomposed: that of the inputs, or that of the windows if there are fewer windows.
     """
@@ -120,19 +120,17 @@ class _Solution:
         return (windows - self.input_mean).reshape(len(windows), -1) / self.scale
 
     def project(self, windows: np.ndarray) -> np.ndarray:
+        """Returns what `coefficients` weigh: the prediction is their product plus `target_mean`."""
         return self._standardised(windows) @ self.basis
 
     def coefficients(self, penalty: float | np.ndarray) -> np.ndarray:
+        """Returns the weights for one penalty, or for a penalty of each output."""
         return self.moments / (np.maximum(self.values, 0.0)[:, None] + penalty)
 
 
-def _with_columns(windows: np.ndarray) -> np.ndarray:
-    windows = np.asarray(windows, np.float64)
-    return windows[:, :, None] if windows.ndim == 2 else windows
-
-
 def _checked(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    windows, targets = _with_columns(inputs), np.asarray(targets, np.float64)
+    windows, targets = np.asarray(inputs, np.float64), np.asarray(targets, np.float64)
+    windows = windows[:, :, None] if windows.ndim == 2 else windows
     starts = np.arange(len(windows)) * windows.shape[1] if starts is None and windows.ndim == 3 else np.asarray(starts)
     if windows.ndim != 3 or targets.ndim != 2 or not 0 < len(windows) == len(targets) == len(starts):
         raise InputError(

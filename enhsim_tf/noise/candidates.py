@@ -6,7 +6,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.noise.names import CANDIDATES
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise, JointAutoregression
+from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 
 _MOST_ORDER = 200  # of the autoregression
@@ -25,18 +25,17 @@ class NoiseModel(Protocol):
 def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.ndarray | None = None) -> NoiseModel:
     """Fits a noise model, one of `names.CANDIDATES`, to windows of noise; raises InputError if it cannot be fitted to this noise.
 
-    Noise and the enhanced signal below it have the shape `(windows, samples, channels)`, or no last axis. `starts` are the first samples of the
-    windows; None: no two overlap.
+    Noise and the enhanced signal below it have the shape `(windows, samples, channels)`. `starts` are the first samples of the windows; None: no
+    two overlap.
     """
-    window = noise.shape[1]
+    _, window, channels = noise.shape
     match name:
         case "none":
-            return GaussianNoise(0.0 if noise.ndim == 2 else np.zeros((noise.shape[2],) * 2), window)
+            return GaussianNoise(np.zeros((channels, channels)), window)
         case "gaussian":
             return GaussianNoise.fit(noise)
         case "autoregression":
-            kind = GaussianAutoregression if noise.ndim == 2 else JointAutoregression
-            return kind.fit(noise, min(_MOST_ORDER, window - 1))
+            return GaussianNoise.fit_autoregressions(noise, min(_MOST_ORDER, window - 1))
         case "residual windows":
             return WindowBootstrap(noise, starts)
         case "matched residual windows":

@@ -7,82 +7,67 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 
 
-class _Stationary:
-    """Noise that does not depend on the signal, drawn by `_draw` in windows or in one series."""
+class GaussianNoise:
+    """Stationary Gaussian noise: white draws that are mixed between channels, and an autoregression of each channel, if there are any.
 
-    window: int
+    Args:
+        root: Matrix by which independent draws are mixed, shape `(channels, channels)`: their covariance is `root @ root.T`.
+        window: Number of samples in a window.
+        processes: The autoregression of each channel, of which the mixed draws are the innovations. Empty: the noise is white.
+    """
 
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(number, samples, channels)`, or without the last axis. The signal has no effect."""
-        return self._draw((number, self.window), rng)
-
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples, channels)`, or without the last axis."""
-        return self._draw((1, num_samples), rng)[0]
-
-
-class GaussianNoise(_Stationary):
-    """White Gaussian noise with the covariance `root @ root.T` between channels; of a single channel the root may be its deviation."""
-
-    def __init__(self, root: np.ndarray | float, window: int):
-        self.root, self.window = np.asarray(root, np.float64), int(window)
+    def __init__(self, root: np.ndarray, window: int, processes: "Sequence[GaussianAutoregression]" = ()):
+        self.root, self.window, self.processes = np.asarray(root, np.float64), int(window), tuple(processes)
 
     @classmethod
     def fit(cls, windows: np.ndarray) -> "GaussianNoise":
-        """Fits to windows of noise of shape `(windows, samples, channels)`, or without the last axis."""
-        if windows.ndim == 2:
-            return cls(np.std(windows, dtype=np.float64), windows.shape[1])
-        rows = windows.reshape(-1, windows.shape[2])
-        return cls(_root(np.cov(rows, rowvar=False, bias=True).reshape(rows.shape[1], -1)), windows.shape[1])
-
-    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-        if self.root.ndim == 0:
-            return (self.root * rng.standard_normal(shape)).astype(np.float32)
-        return (rng.standard_normal((*shape, len(self.root))) @ self.root.T).astype(np.float32)
-
-
-def _root(covariance: np.ndarray) -> np.ndarray:
-    """Returns the symmetric root of a covariance, which may be singular."""
-    values, vectors = np.linalg.eigh(covariance)
-    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-
-
-class JointAutoregression(_Stationary):
-    """Gaussian autoregressive noise of several channels: one `GaussianAutoregression` each, with innovations of this correlation."""
-
-    def __init__(self, channels: "Sequence[GaussianAutoregression]", correlation: np.ndarray):
-        self.channels, self.correlation = tuple(channels), np.asarray(correlation, np.float64)
-        self.window, self._root = self.channels[0].window, _root(self.correlation)
+        """Fits white noise to windows of noise of shape `(windows, samples, channels)`."""
+        return cls(_root(np.cov(windows.reshape(-1, windows.shape[2]), rowvar=False, bias=True)), windows.shape[1])
 
     @classmethod
-    def fit(cls, windows: np.ndarray, max_order: int = 40) -> "JointAutoregression":
-        """Fits to windows of noise of shape `(windows, samples, channels)`; see `GaussianAutoregression.fit`."""
+    def fit_autoregressions(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianNoise":
+        """Fits an autoregression to each channel, see `GaussianAutoregression.fit`, and the correlation of their innovations."""
         from scipy.signal import lfilter
 
         found = [GaussianAutoregression.fit(windows[:, :, channel], max_order) for channel in range(windows.shape[2])]
         most = max(len(each.coefficients) for each in found)
         left = [lfilter([1.0, *-each.coefficients], [1.0], windows[:, :, k], axis=1)[:, most:].ravel() for k, each in enumerate(found)]
-        return cls(found, np.corrcoef(left).reshape(len(found), -1))
+        return cls(_root(np.corrcoef(left)), windows.shape[1], found)
+
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no effect."""
+        return self._draw((number, self.window), rng)
+
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws one series of any length, float32 of shape `(num_samples, channels)`. The signal has no effect."""
+        return self._draw((1, num_samples), rng)[0]
 
     def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-        draws = rng.standard_normal((*shape, len(self.channels))) @ self._root.T
-        return np.stack([each.filtered(draws[:, :, channel]) for channel, each in enumerate(self.channels)], axis=2)
+        draws = rng.standard_normal((*shape, len(self.root))) @ self.root.T
+        if self.processes:
+            draws = np.stack([each.filtered(draws[:, :, channel]) for channel, each in enumerate(self.processes)], axis=2)
+        return draws.astype(np.float32)
 
 
-class GaussianAutoregression(_Stationary):
-    """Gaussian autoregressive noise: it has the spectrum of the real noise, and no other property of it.
+def _root(covariance: np.ndarray) -> np.ndarray:
+    """Returns the symmetric root of a covariance, which may be singular, or of the variance of a single channel."""
+    values, vectors = np.linalg.eigh(np.atleast_2d(covariance))
+    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+
+
+class GaussianAutoregression:
+    """Gaussian autoregressive noise of one channel: it has the spectrum of the real noise, and no other property of it.
 
     Args:
         coefficients: Autoregressive coefficients, from lag 1 upwards. An empty sequence gives white noise.
         innovation_sd: Standard deviation of the innovations, in the unit of the telemetry.
-        window: Number of samples in a window.
 
     Raises:
         InputError: If the coefficients do not belong to a stationary process, or the standard deviation is negative.
     """
 
-    def __init__(self, coefficients: Sequence[float], innovation_sd: float, window: int):
-        self.coefficients, self.innovation_sd, self.window = np.asarray(coefficients, np.float64), float(innovation_sd), int(window)
+    def __init__(self, coefficients: Sequence[float], innovation_sd: float):
+        self.coefficients, self.innovation_sd = np.asarray(coefficients, np.float64), float(innovation_sd)
         if not self.innovation_sd >= 0:
             raise InputError(f"Expected innovations with a standard deviation of 0 or more. Received: {self.innovation_sd}.")
         self._start = _lower_orders(self.coefficients, self.innovation_sd)
@@ -111,10 +96,7 @@ class GaussianAutoregression(_Stationary):
             orders.append((coefficients, variance))
             criteria.append(windows.size * np.log(variance) + 2 * order)
         coefficients, variance = orders[int(np.argmin(criteria))]
-        return cls(coefficients, np.sqrt(variance), windows.shape[1])
-
-    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-        return self.filtered(rng.standard_normal(shape))
+        return cls(coefficients, np.sqrt(variance))
 
     def filtered(self, draws: np.ndarray) -> np.ndarray:
         """Returns the noise whose innovations are `draws`, standard normal of shape `(windows, samples)`; float32 of that shape."""

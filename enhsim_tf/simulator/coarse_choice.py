@@ -12,6 +12,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhancer.ridge import RidgeSolution
 from enhsim_tf.simulator.options import FEWEST_SAMPLES, LEAST_LEARNT, LEAST_WINDOW, MOST_WINDOW, default_window
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import time_blocks
@@ -138,11 +139,10 @@ def _held_out_share(values: np.ndarray, commands: np.ndarray) -> float:
         chosen = CommandTraces.fit(values, commands, training)
         if chosen is None:
             return 0.0
-        inputs = chosen.traces(commands).astype(np.float64)
-        centre, spread, target = inputs[training].mean(axis=0), inputs[training].std(axis=0), values[training].mean()
-        scaled = (inputs - centre) / np.where(spread > _NEGLIGIBLE, spread, np.inf)  # a trace that training does not show has no weight
-        gram, moments = scaled[training].T @ scaled[training], scaled[training].T @ (values[training] - target)
+        inputs, targets = chosen.traces(commands)[:, None].astype(np.float64), values[:, None]
+        inputs *= inputs[training].std(axis=0) > _NEGLIGIBLE  # a trace that training does not show has no weight
+        solution = RidgeSolution(inputs[training], targets[training])
+        centred, inner = targets[held_out] - solution.target_mean, solution.project(inputs[held_out])
         for number, penalty in enumerate(_PENALTIES):
-            weights = np.linalg.solve(gram + penalty * len(training) * np.eye(len(gram)), moments)
-            left[number] += np.sum((values[held_out] - target - scaled[held_out] @ weights) ** 2)
+            left[number] += np.sum((centred - inner @ solution.coefficients(penalty * len(training))) ** 2)
     return float(1 - left.min() / (len(values) * np.var(values)))

@@ -70,14 +70,10 @@ def judge_detectors(simulator: EnhancedSimulator, held_out: Recording, run: Reco
     """Judges all candidates on nominal telemetry after the fit, in parts of at least a window, and its coarse run, for recorded runs."""
     series = simulator.judged_series(held_out, run)
     windows, clean = simulator.windows_and_signal(held_out, run, 3 * _NUM_ANOMALOUS)
-    below = 0.0 if run is None else clean
-    anomalous = anomalous_windows(
-        windows, np.where(simulator.noise_sd > 0, simulator.noise_sd, simulator.scale), seed, _NUM_ANOMALOUS, SEVERITIES
-    )
-    if run is not None:
-        at = np.linspace(0, len(windows) - 1, min(_NUM_ANOMALOUS, len(windows))).astype(int)
-        order = np.concatenate([np.arange(place, len(at), 3) for place in range(3)])  # in which `anomalous_windows` returns them
-        anomalous = {key: each - clean[at][order] for key, each in anomalous.items()}
+    below = np.zeros_like(clean) if run is None else clean
+    some = np.linspace(0, len(windows) - 1, min(_NUM_ANOMALOUS, len(windows))).astype(int)
+    unit = np.where(simulator.noise_sd > 0, simulator.noise_sd, simulator.scale)
+    anomalous = {key: each - below[some] for key, each in anomalous_windows(windows[some], unit, seed, SEVERITIES).items()}
     if len(simulator.channels) > 1:
         relations = relation_anomalies(windows, clean, np.random.default_rng([seed, 17]))
         anomalous |= {key: each - below for key, each in relations.items()}

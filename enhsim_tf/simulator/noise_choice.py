@@ -43,7 +43,7 @@ which a classifier tells quantised noise from itself."""
 
 @dataclasses.dataclass(frozen=True)
 class NoiseWindows:
-    """Windows of noise, telemetry minus enhanced signal, of shape `(windows, samples, channels)` or without the last axis."""
+    """Windows of noise, telemetry minus enhanced signal, of shape `(windows, samples, channels)`."""
 
     noise: np.ndarray
     clean: np.ndarray  # the enhanced windows below them
@@ -169,28 +169,28 @@ class HeldOutJudge:
         self._clean, self._few = first.clean, first.evenly(few).clean
         real, held_out = pieces_of(learnt, judged)
         self._unit = spread_of(real.noise)
-        self._edges = [signal_edges(each) for each in _channels(real.clean)]
+        self._edges = [signal_edges(each) for each in np.moveaxis(real.clean, 2, 0)]
         self._held_out_features = self._features(held_out)
         self.real_auc = boosted_trees(self._features(real), self._held_out_features, seed)
         self._noise_sd, self._nominal = spread_of(first.noise), self._seen(judged.evenly(number))
-        self._anomalous = np.concatenate(list(anomalous_windows(self._nominal, self._noise_sd, seed, _NUM_ANOMALOUS).values()))
+        some = self._seen(judged.evenly(number).evenly(min(_NUM_ANOMALOUS, number)))
+        self._anomalous = np.concatenate(list(anomalous_windows(some, self._noise_sd, seed).values()))
         self.real_alarms, self.real_recall = self._detected(self._seen(first))
 
     def _features(self, windows: NoiseWindows) -> np.ndarray:
         """What the classifier sees: features of the noise, also where the signal has different levels and slopes, and between channels."""
         noise = np.round(np.asarray(windows.noise, np.float64) / self._unit, DECIMALS)
         columns = []
-        for own, signal, edges in zip(_channels(noise), _channels(windows.clean), self._edges, strict=True):
+        for own, signal, edges in zip(np.moveaxis(noise, 2, 0), np.moveaxis(windows.clean, 2, 0), self._edges, strict=True):
             columns += [window_features(own), signal_features(own, signal, edges)]
-        if noise.ndim == 3 and noise.shape[2] > 1:
-            centred = noise - noise.mean(axis=1, keepdims=True)
-            covariance = np.einsum("wsa,wsb->wab", centred, centred)
-            size = np.sqrt(np.maximum(np.einsum("waa->wa", covariance), 1e-12))
-            columns.append((covariance / (size[:, :, None] * size[:, None]))[:, *np.triu_indices(noise.shape[2], 1)])
-            # where the signal of the first channel of a pair is high minus where it is low
-            sign = np.sign(windows.clean - windows.clean.mean(axis=(0, 1)))
-            by_signal = np.einsum("wsa,wsb->wab", sign * centred, centred) / (size[:, :, None] * size[:, None])
-            columns.append(by_signal[:, ~np.eye(noise.shape[2], dtype=bool)])
+        centred = noise - noise.mean(axis=1, keepdims=True)
+        covariance = np.einsum("wsa,wsb->wab", centred, centred)
+        size = np.sqrt(np.maximum(np.einsum("waa->wa", covariance), 1e-12))
+        columns.append((covariance / (size[:, :, None] * size[:, None]))[:, *np.triu_indices(noise.shape[2], 1)])
+        # where the signal of the first channel of a pair is high minus where it is low
+        sign = np.sign(windows.clean - windows.clean.mean(axis=(0, 1)))
+        by_signal = np.einsum("wsa,wsb->wab", sign * centred, centred) / (size[:, :, None] * size[:, None])
+        columns.append(by_signal[:, ~np.eye(noise.shape[2], dtype=bool)])
         return np.concatenate(columns, axis=1)
 
     def _seen(self, windows: NoiseWindows) -> np.ndarray:
@@ -254,33 +254,20 @@ def signal_features(noise_windows: np.ndarray, signal_windows: np.ndarray, edges
     return np.stack(columns, axis=1)
 
 
-def _channels(windows: np.ndarray) -> list[np.ndarray]:
-    return [windows] if windows.ndim == 2 else [windows[:, :, channel] for channel in range(windows.shape[2])]
-
-
 def anomalous_windows(
-    nominal: np.ndarray, noise_sd: np.ndarray, seed: int, number: int, severities: Sequence[float] = SEVERITIES
+    nominal: np.ndarray, noise_sd: np.ndarray, seed: int, severities: Sequence[float] = SEVERITIES
 ) -> dict[tuple[str, float], np.ndarray]:
-    """Injects anomalies of every kind and severity, in units of the noise of each channel, into one channel of nominal windows.
-
-    For each kind and severity, `number` windows are taken evenly from the nominal ones, in the order of time; three durations alternate.
-    """
-    chosen = nominal[np.linspace(0, len(nominal) - 1, min(number, len(nominal))).astype(int)]
+    """Injects anomalies of every kind and severity, in units of the noise of each channel, into one channel of each window; durations alternate."""
     durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
     found = {}
     for kind in INJECTIONS:
         for severity in severities:
-            parts = []
+            windows = found[kind, severity] = nominal.copy()
             for place, duration in enumerate(durations):
-                windows, rng = chosen[place :: len(durations)].copy(), np.random.default_rng([seed, place])
-                if windows.ndim == 2:
-                    parts.append(inject(windows, kind, severity, duration, float(noise_sd), rng)[0])
-                    continue
-                channel = rng.integers(0, windows.shape[2], len(windows))
-                rows, unit = np.arange(len(windows)), noise_sd[channel][:, None]
+                rows, rng = np.arange(place, len(windows), len(durations)), np.random.default_rng([seed, place])
+                channel = rng.integers(0, windows.shape[2], len(rows))
+                unit = noise_sd[channel][:, None]
                 windows[rows, :, channel] = inject(windows[rows, :, channel] / unit, kind, severity, duration, 1.0, rng)[0] * unit
-                parts.append(windows)
-            found[kind, severity] = np.concatenate(parts)
     return found
 
 

@@ -114,7 +114,7 @@ class Scorer:
         """What the detector sees of windows: one channel as it is, several in units of their standard deviations."""
         if self.on_residual and not self.simulator.is_run_model:
             windows = self.simulator.residuals(windows)
-        return windows[:, :, 0] if windows.shape[2] == 1 else windows / self.unit
+        return windows / self.unit
 
     def _raw(self, series: np.ndarray) -> np.ndarray:
         """Scores each sample of a series of shape `(samples, channels)`, without dividing by the threshold."""

@@ -1,4 +1,4 @@
-"""Windows of a series: splitting by time, the starts of windows, and cutting windows.
+"""Windows of a series: the starts of windows, where they lie, and splitting them by time.
 
 The start of a window is the index of its first sample. In a series of several parts, starts are counted over the samples at which a
 complete window can start, part after part, so that they are the sample numbers if there is one part. In all functions, `parts` are
@@ -40,11 +40,6 @@ def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) 
     """Returns window starts that are evenly spaced over the series, in the order of time; if fewer than `num_windows` are possible, all."""
     num_starts = num_window_starts(parts, window)
     return np.unique(np.linspace(0, num_starts - 1, min(num_windows, num_starts)).astype(np.int64))
-
-
-def cut_windows(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarray:
-    """Cuts windows that begin at the samples `starts` out of a series; returns an array of shape `(windows, window)`."""
-    return np.lib.stride_tricks.sliding_window_view(values, window)[starts]
 
 
 def places_in_parts(parts: Sequence[Sized], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:

@@ -48,7 +48,7 @@ class Judge:
 
     def _fit(self, rows: Any) -> Callable[[np.ndarray], np.ndarray]:
         pairs = self.pairs
-        enhancer = fit_enhancer(self.candidate, pairs.coarse[rows], pairs.telemetry[rows], pairs.starts[rows], self.seed)
+        enhancer = fit_enhancer(self.candidate, pairs.coarse[rows], pairs.telemetry[rows][:, :, None], pairs.starts[rows], self.seed)
         return lambda coarse: enhancer.predict(coarse)[:, :, 0]
 
     @functools.cached_property

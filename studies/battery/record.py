@@ -8,8 +8,9 @@ import numpy as np
 
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.stages import save_arrays
+from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.simulator.joint import cut
-from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
+from enhsim_tf.telemetry.windows import evenly_spaced_starts
 from studies.battery.faults import ALL, SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, Regime, draw_load
 from studies.battery.simulate import MODELS, simulate_all

@@ -51,7 +51,7 @@ def tables_of_cell(settings: Settings, stages: Stages, regime: str, seed: int, v
 
         runs = load_arrays(folder, "runs")
         pairs = record.pair_windows(runs, "fit", _NUM_WINDOWS, seed)
-        chosen = choose_enhancer(pairs.coarse, pairs.telemetry, pairs.starts, seed=seed).enhancer.name
+        chosen = choose_enhancer(pairs.coarse, pairs.telemetry[:, :, None], pairs.starts, seed=seed).enhancer.name
         one = Judge(runs, pairs, chosen, seed)
         pd.DataFrame(one.source_rows() + one.reference_rows()).assign(regime=regime, seed=seed).to_parquet(found / "alarms.parquet")
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.noise.surrogates import GaussianAutoregression
+from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
-from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
+from enhsim_tf.paper.telemetry import cut_windows
+from enhsim_tf.telemetry.windows import random_window_starts
 from studies.common import detectors, evaluation
 from studies.factorial.cells import (
     AUTOREGRESSION,
@@ -109,7 +110,7 @@ class Pipelines:
         if cell == "coarse":
             return coarse
         rng = np.random.default_rng(int(self.example.draw(purpose).integers(2**31)))
-        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(number, rng)
+        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(number, rng).reshape(coarse.shape)
 
     def number(self, windows: str) -> int:
         """Number of windows that a level of the factor `windows` stands for."""
@@ -152,7 +153,7 @@ class Pipelines:
 
         self.stages.progress.step("enhancer network")
         starts = self.training_starts(MANY)
-        enhancer = fit_enhancer(NETWORK, *self.pairs(starts), starts, self.seed, self.settings.second.epochs)
+        enhancer = fit_enhancer(NETWORK, *(each[:, :, None] for each in self.pairs(starts)), starts, self.seed, self.settings.second.epochs)
         arrays = {"centre": enhancer.centre, "bias": enhancer.bias}
         for layer, (kernel, bias) in enumerate(enhancer.layers):
             arrays |= {f"kernel_{layer}": kernel, f"bias_{layer}": bias}
@@ -167,7 +168,7 @@ class Pipelines:
         coarse, target = self.pairs(starts)
         return target - self.enhancer(enhancer, windows)(coarse)
 
-    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | PaperGAN":
+    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianNoise | PaperGAN":
         """The fitted noise model of a cell. The last one is kept, because both purposes and some cells share it."""
         key = (*cell.source, cell.generator)
         if self._model is None or self._model[0] != key:
@@ -179,8 +180,8 @@ class Pipelines:
             self._model = (key, fit(self.extracted(*cell.source)))
         return self._model[1]
 
-    def _autoregression(self, noise: np.ndarray) -> GaussianAutoregression:
-        return GaussianAutoregression.fit(noise, min(self.settings.factorial.max_order, self.window - 1))
+    def _autoregression(self, noise: np.ndarray) -> GaussianNoise:
+        return GaussianNoise.fit_autoregressions(noise[:, :, None], min(self.settings.factorial.max_order, self.window - 1))
 
     def _paper_gan(self, noise: np.ndarray) -> "PaperGAN":
         from studies.common.paper_gan import PaperGAN

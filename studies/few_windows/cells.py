@@ -12,9 +12,8 @@ import numpy as np
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
-from enhsim_tf.paper.telemetry import true_signal
+from enhsim_tf.paper.telemetry import cut_windows, true_signal
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows
 from studies.common.detectors import DETECTORS
 from studies.common.evaluation import cross_fitted_scores
 from studies.common.example import coarse_simulator, draw_noise

@@ -20,8 +20,9 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise.candidates import fit_candidate
+from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, time_blocks
+from enhsim_tf.telemetry.windows import evenly_spaced_starts, time_blocks
 
 REAL, CORAL = "real", "CORAL"
 SIMULATOR = "simulator + "
@@ -68,7 +69,8 @@ class Record:
         """Generates windows of the simulator with noise of one of `NOISE_MODELS`; `purpose` is the number of the random draw."""
         rng = np.random.default_rng([self.seed, purpose])
         clean = self.enhance(self._coarse(rng.integers(0, _START_RANGE, num_windows)))
-        return clean + fit_candidate(name, *self.residuals, self.starts).generate(num_windows, rng, clean)
+        model = fit_candidate(name, *(each[:, :, None] for each in self.residuals), self.starts)
+        return clean + model.generate(num_windows, rng, clean[:, :, None])[:, :, 0]
 
 
 def coral_alignment(source: np.ndarray, target: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

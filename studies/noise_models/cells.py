@@ -83,10 +83,10 @@ class Cell:
         rng = np.random.default_rng([seed, _STREAMS[name], _DRAW])
         purposes = ("ladder, training", "ladder, threshold")
         waves = [self.example.windows("train", self.settings.robustness.num_windows, purpose)["truth"] for purpose in purposes]
-        arms = [clean + model.generate(len(clean), rng, clean) for clean in waves]
+        arms = [clean + model.generate(len(clean), rng, clean[:, :, None])[:, :, 0] for clean in waves]
         more = self.example.windows("calibration", number, "ladder, realism")["truth"]
         # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
-        compared = [more + model.generate(number, rng, more) - more for _ in range(_NUM_DRAWS)]
+        compared = [more + model.generate(number, rng, more[:, :, None])[:, :, 0] - more for _ in range(_NUM_DRAWS)]
         judgement = self._judge.judge(name, model, np.random.default_rng([seed, _DRAW_OF_JUDGE, _STREAMS[name]]))
         return arms, compared, [{key: value for key, value in dataclasses.asdict(judgement).items() if key != "name"}]
 
@@ -94,7 +94,7 @@ class Cell:
         if name != LEARNT:
             return self._learnt.fit(name)
         learner = MixtureDensityNoise(self.settings.seed, self.settings.noise_models.num_steps)
-        return learner.fit(self._learnt.noise, self._learnt.clean, self._learnt.starts)
+        return _OneChannel(learner.fit(self._learnt.noise[:, :, 0], self._learnt.clean[:, :, 0], self._learnt.starts))
 
     def _floor(self) -> tuple[RealFloor, np.ndarray]:
         """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample."""
@@ -123,13 +123,25 @@ class Cell:
 
     def _with_noise(self, part: str, number: int, purpose: str) -> NoiseWindows:
         windows = self.example.windows(part, number, purpose)
-        return NoiseWindows(windows["target"] - windows["truth"], windows["truth"], windows["start"])
+        target, truth = (windows[name][:, :, None] for name in ("target", "truth"))
+        return NoiseWindows(target - truth, truth, windows["start"])
 
     @functools.cached_property
     def _judge(self) -> HeldOutJudge:
         """Judges noise models as `fit` does, by windows of the same telemetry that they have not seen."""
         number = min(MOST_JUDGED, self.settings.noise_models.num_windows)
         return HeldOutJudge(self._learnt, self._with_noise("calibration", number, "ladder, judged"), self.settings.seed)
+
+
+class _OneChannel:
+    """The learnt noise, which knows no axis of channels, with one."""
+
+    def __init__(self, model: MixtureDensityNoise):
+        self.model = model
+
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples, 1)`, as the signal."""
+        return self.model.generate(number, rng, signal[:, :, 0])[:, :, None]
 
 
 def _measured(floor: RealFloor, compared: list[np.ndarray]) -> "pd.DataFrame":

@@ -107,7 +107,7 @@ class DegradedModes:
         starts = coarse.shape[1] * np.arange(len(coarse))  # windows of one configuration are neighbours, and stay in one block
 
         def learnt_on_faults(name: str) -> Estimate:
-            enhancer = fit_enhancer(name, coarse, target, starts, self.settings.seed)
+            enhancer = fit_enhancer(name, coarse[:, :, None], target[:, :, None], starts, self.settings.seed)
             return lambda windows: enhancer.predict(windows[:, :, None])[:, :, 0]
 
         return {

@@ -8,7 +8,7 @@ import numpy as np
 
 from enhsim_tf.common.figure import Figure
 from enhsim_tf.common.plot_style import DASHED, DOUBLE, ENHANCED, GREY_TINT, REAL, new_sheet, panels
-from enhsim_tf.telemetry.windows import cut_windows
+from enhsim_tf.paper.telemetry import cut_windows
 from studies.spacecraft.telemanom import LabelledChannel
 
 CHANNEL, LATER = "G-1", 7_000

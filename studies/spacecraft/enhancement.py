@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.simulator.alignment import Waves
-from enhsim_tf.telemetry.windows import cut_windows
 from studies.spacecraft.judging import windows_that_meet
 from studies.spacecraft.telemanom import LabelledChannel
 

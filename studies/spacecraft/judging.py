@@ -7,7 +7,8 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
-from enhsim_tf.telemetry.windows import cut_windows, mean_over_windows
+from enhsim_tf.paper.telemetry import cut_windows
+from enhsim_tf.telemetry.windows import mean_over_windows
 from studies.common.metrics import vus_pr
 from studies.spacecraft.telemanom import LabelledChannel
 

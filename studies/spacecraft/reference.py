@@ -7,7 +7,7 @@ import numpy as np
 
 from enhsim_tf.detection.detectors import ResidualSize
 from enhsim_tf.detection.registry import RESIDUAL
-from enhsim_tf.telemetry.windows import cut_windows
+from enhsim_tf.paper.telemetry import cut_windows
 from studies.common.settings import Settings
 from studies.spacecraft.judging import STRIDES, Judge
 from studies.spacecraft.telemanom import LabelledChannel

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.common.console import Progress
+from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.simulator.simulator import check_finite
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, random_window_starts
+from enhsim_tf.telemetry.windows import evenly_spaced_starts, random_window_starts
 from studies.common.controls import CONTROLS
 from studies.common.detectors import DETECTORS
 from studies.common.evaluation import cross_fitted_scores

@@ -24,6 +24,14 @@ def test_the_command_and_its_decay_are_recovered(sent):
     assert unrelated.traces is None
 
 
+def test_a_command_that_was_sent_only_in_held_out_time_does_not_hide_what_another_explains():
+    rng = np.random.default_rng(0)
+    sent = np.stack([rng.random(2_000) < 0.02, np.arange(2_000) == 650], axis=1).astype(np.float32)
+    values = np.convolve(sent[:, 0], np.exp(-np.arange(100) / 8))[:2_000] + 0.05 * rng.standard_normal(2_000)
+    values[800:812] += 5 * np.exp(-np.arange(12) / 8)  # where the held-out block ends, as the tail of the second command would
+    assert choose_coarse([Telemetry(values.astype(np.float32), name="celsius")], commands=sent).traces is not None
+
+
 def test_what_is_refused(sent, refused):
     with refused("decay of 0 samples or more"):
         CommandTraces([(1, -1.0)])

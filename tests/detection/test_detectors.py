@@ -33,14 +33,19 @@ def area(anomalous, nominal):
 
 
 def waves(number, seed, noise_sd=0.1):
-    """Sines of 40 samples at random phases, in noise, around 5."""
+    """Sines of 40 samples at random phases, in noise, around 5, of shape `(windows, samples)`."""
     rng = np.random.default_rng(seed)
     phases = rng.uniform(0, 2 * np.pi, (number, 1))
     return (5 + np.sin(2 * np.pi * np.arange(100) / 40 + phases) + noise_sd * rng.standard_normal((number, 100))).astype(np.float32)
 
 
+def one_channel(number, seed):
+    """The waves with the axis of channels."""
+    return waves(number, seed)[:, :, None]
+
+
 def anomalous(kind):
-    """Windows of one kind of anomaly."""
+    """Windows of one channel, with one kind of anomaly."""
     windows = waves(60, 1, noise_sd=0.4 if kind == "noisy" else 0.1)
     if kind == "stuck":
         windows[:, 30:] = windows[:, 30:31]
@@ -48,19 +53,19 @@ def anomalous(kind):
         windows[:, 50] += 3
     elif kind == "shifted":
         windows[:, 40:70] += 3
-    return windows
+    return windows[:, :, None]
 
 
 @pytest.fixture(scope="module", params=DETECTORS)
 def fitted(request):
     """The name of a detector, and the detector fitted to 400 nominal windows."""
-    return request.param, DETECTORS[request.param](0).fit(waves(400, 0))
+    return request.param, DETECTORS[request.param](0).fit(one_channel(400, 0))
 
 
 @pytest.mark.parametrize("anomaly", ["stuck", "noisy", "spike", "shifted"])
 def test_planted_anomalies_are_found(fitted, anomaly):
     name, detector = fitted
-    nominal, scores = detector.score(waves(60, 3)), detector.score(anomalous(anomaly))
+    nominal, scores = detector.score(one_channel(60, 3)), detector.score(anomalous(anomaly))
     assert scores.shape == nominal.shape == (60,) and np.isfinite(scores).all()
     if anomaly in MUST_SEE[name]:
         assert area(scores, nominal) > 0.95
@@ -68,7 +73,7 @@ def test_planted_anomalies_are_found(fitted, anomaly):
 
 @pytest.mark.parametrize("name", DETECTORS)
 def test_same_seed_same_scores(name):
-    training, windows = waves(120, 0), waves(20, 1)
+    training, windows = one_channel(120, 0), one_channel(20, 1)
     first, again, other = (DETECTORS[name](seed).fit(training).score(windows) for seed in (3, 3, 4))
     assert (first == again).all()
     if name == "isolation forest":

@@ -22,6 +22,8 @@ def series(num_samples=2_400, seed=0, width=9):
 
 
 def windows_of(coarse, target, num_windows=400):
+    """Windows of both, each of shape `(windows, samples, columns)`; a target of one channel is a series."""
+    target = target.reshape(len(target), -1)
     starts = np.linspace(0, len(coarse) - WINDOW, num_windows).astype(int)
     places = starts[:, None] + np.arange(WINDOW)
     return coarse[places], target[places], starts

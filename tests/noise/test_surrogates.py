@@ -5,7 +5,7 @@ import pytest
 from numpy.random import default_rng
 from scipy.signal import lfilter
 
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise, JointAutoregression
+from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
 
 
 def test_gaussian_noise_of_several_channels_keeps_their_covariance():
@@ -52,8 +52,10 @@ def test_akaike_chooses_the_order_that_least_squares_would():
 
 def test_generated_autoregression_is_stationary_and_has_the_closed_form():
     number, samples, first, second = 20_000, 40, 1.2, -0.5
-    noise = GaussianAutoregression([first, second], 0.3, samples).generate(number, default_rng(4))
-    assert noise.shape == (number, samples) and noise.dtype == np.float32
+    model = GaussianNoise(np.eye(1), samples, [GaussianAutoregression([first, second], 0.3)])
+    noise = model.generate(number, default_rng(4))
+    assert noise.shape == (number, samples, 1) and noise.dtype == np.float32
+    noise = noise[:, :, 0]
     expected = [1, first / (1 - second)]  # the recursion of Yule and Walker
     while len(expected) < samples:
         expected.append(first * expected[-1] + second * expected[-2])
@@ -69,11 +71,11 @@ def test_joint_autoregression_recovers_the_channels_and_their_cross_correlation(
     number, samples, correlation = 400, 300, 0.8
     draws = default_rng(0).multivariate_normal([0, 0], [[1, correlation], [correlation, 1]], (number, samples))
     values = np.stack([lfilter([1.0], [1.0, -memory], draws[:, :, channel]) for channel, memory in enumerate((0.9, -0.5))], axis=2)
-    fitted = JointAutoregression.fit(values[:, 100:] * [2.0, 7.0], max_order=1)
+    fitted = GaussianNoise.fit_autoregressions(values[:, 100:] * [2.0, 7.0], max_order=1)
     error = 5 / np.sqrt(number * 200)
-    for each, coefficient, scale in zip(fitted.channels, (0.9, -0.5), (2.0, 7.0), strict=True):
+    for each, coefficient, scale in zip(fitted.processes, (0.9, -0.5), (2.0, 7.0), strict=True):
         assert each.coefficients == pytest.approx([coefficient], abs=error) and each.innovation_sd == pytest.approx(scale, rel=error)
-    assert fitted.correlation == pytest.approx(np.array([[1, correlation], [correlation, 1]]), abs=error)
+    assert fitted.root @ fitted.root.T == pytest.approx(np.array([[1, correlation], [correlation, 1]]), abs=error)
     noise = fitted.generate(2_000, default_rng(1))[:, 150:]
     assert noise.shape == (2_000, 50, 2) and noise.dtype == np.float32
     # closed form of two AR(1): E xy = c / (1 - ab), E xx = 1 / (1 - a^2), E yy = 1 / (1 - b^2)
@@ -83,18 +85,12 @@ def test_joint_autoregression_recovers_the_channels_and_their_cross_correlation(
     assert fitted.generate_series(30, default_rng(1)).shape == (30, 2)
 
 
-def test_a_single_channel_has_the_same_noise_with_and_without_its_axis():
-    windows = second_order(1.2, -0.5, 50, 60, seed=0)
-    joint, plain = JointAutoregression.fit(windows[:, :, None], 4), GaussianAutoregression.fit(windows, 4)
-    np.testing.assert_array_equal(joint.generate(5, default_rng(2))[:, :, 0], plain.generate(5, default_rng(2)))
-
-
 def test_autoregressions_that_are_refused(refused):
     with refused("stationary"):
-        GaussianAutoregression([1.2], 0.1, 50)
+        GaussianAutoregression([1.2], 0.1)
     with refused("stationary"):
-        GaussianAutoregression([0.5, 0.5], 0.1, 50)  # a root on the unit circle
+        GaussianAutoregression([0.5, 0.5], 0.1)  # a root on the unit circle
     with refused("0 or more", "-1.0"):
-        GaussianAutoregression([0.5], -1.0, 9)
+        GaussianAutoregression([0.5], -1.0)
     with refused("noise that varies"):
         GaussianAutoregression.fit(np.ones((5, 30)), 4)

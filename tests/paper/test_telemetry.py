@@ -4,7 +4,7 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.paper.degraded import MODES, degrade
 from enhsim_tf.paper.square_wave import simulator, square_wave
-from enhsim_tf.paper.telemetry import ParquetStore, Telemetry, make_telemetry, random_starts, split, true_signal
+from enhsim_tf.paper.telemetry import ParquetStore, Telemetry, cut_windows, make_telemetry, random_starts, split, true_signal
 from tests.paper.conftest import tiny_settings
 
 SETTINGS = tiny_settings()
@@ -47,6 +47,12 @@ def test_telemetry_that_is_too_short_is_refused():
 
 def test_random_starts_reach_the_first_and_the_last_window():
     assert set(random_starts(12, 10, 200, np.random.default_rng(0))) == {0, 1, 2}
+
+
+def test_windows_cut_by_hand():
+    values = np.array([5, 6, 7, 8, 9], np.float32)
+    found = cut_windows(values, np.array([0, 2, 2]), 3)
+    assert found.tolist() == [[5, 6, 7], [7, 8, 9], [7, 8, 9]] and found.dtype == np.float32
 
 
 def test_a_square_wave_is_high_in_the_first_half_of_its_period():

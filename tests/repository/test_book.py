@@ -78,7 +78,7 @@ def test_the_examples_for_contributors_work(tmp_path):
     names = {"np": np, "pd": pd, "Path": Path, "Any": Any, "Channels": Channels, "InputError": InputError}
     for block in re.findall(r"```python\n(\S.*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.S):
         exec(block, names)
-    windows = np.array([[0.0, 1.0], [2.0, 3.0], [0.0, 4.0]])
+    windows = np.array([[0.0, 1.0], [2.0, 3.0], [0.0, 4.0]])[:, :, None]
     assert names["WindowRange"]().fit(windows).score(windows).tolist() == [0, 0, 3]
     assert names["Ramp"](4.0).run(np.arange(6)).ravel().tolist() == [0, 0.25, 0.5, 0.75, 0, 0.25]
     (tmp_path / "x.jsonl").write_text('{"volts": 1.5, "mode": "on"}\n{"volts": 2.5, "mode": "off"}\n')

@@ -64,7 +64,7 @@ def test_the_rule_of_the_choice_by_hand(judgements, expected):
 
 def test_anomalies_are_in_one_channel_and_of_the_asked_size():
     nominal = np.zeros((6, 120, 2), np.float32)
-    found = anomalous_windows(nominal, np.array([1.0, 10.0]), 0, 6, (4.0,))["level_shift", 4.0]
+    found = anomalous_windows(nominal, np.array([1.0, 10.0]), 0, (4.0,))["level_shift", 4.0]
     size = np.abs(found).max(axis=1)
     assert ((size > 0).sum(axis=1) == 1).all() and set(size[size > 0].tolist()) == {4.0, 40.0}
 
@@ -84,9 +84,9 @@ def test_noise_on_levels_is_not_told_from_itself_by_rounding_errors_of_32_bits()
     assert 0 < np.max(np.abs(stored - noise)) < 1e-6
     exact, real = noise[:300], stored[300:]
     assert boosted_trees(window_features(exact / 0.1), window_features(real / 0.1)) > 0.7
-    signal32, places = signal.astype(np.float32), 60 * np.arange(600)
+    stored, signal32, places = stored[:, :, None], signal.astype(np.float32)[:, :, None], 60 * np.arange(600)
     learnt, judged = (NoiseWindows(stored[some], signal32[some], places[some]) for some in (slice(0, 300), slice(300, None)))
-    judgement = HeldOutJudge(learnt, judged, seed=0).judge("exact", WindowBootstrap(exact), rng)
+    judgement = HeldOutJudge(learnt, judged, seed=0).judge("exact", WindowBootstrap(exact[:, :, None]), rng)
     assert judgement.auc < 0.58
 
 

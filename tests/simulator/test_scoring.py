@@ -115,7 +115,7 @@ class Largest:
         return self
 
     def score(self, windows):
-        return windows.max(axis=1)
+        return windows.max(axis=(1, 2))
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.windows import cut_windows, disjoint_rows, evenly_spaced_starts, random_window_starts, time_blocks
+from enhsim_tf.telemetry.windows import disjoint_rows, evenly_spaced_starts, random_window_starts, time_blocks
 
 
 def test_blocks_of_time_by_hand():
@@ -51,9 +51,3 @@ def test_evenly_spaced_starts_reach_from_end_to_end():
     starts = evenly_spaced_starts([range(1_000)], 60, 37)
     assert (starts[0], starts[-1]) == (0, 940) and set(np.diff(starts)) == {26, 27}  # 940 / 36 = 26.1
     assert evenly_spaced_starts([range(60)], 60, 3).tolist() == [0]
-
-
-def test_cut_windows_by_hand():
-    values = np.array([5, 6, 7, 8, 9], np.float32)
-    assert cut_windows(values, np.array([0, 2, 2]), 3).tolist() == [[5, 6, 7], [7, 8, 9], [7, 8, 9]]
-    assert cut_windows(values, np.array([0, 2]), 3).dtype == np.float32
