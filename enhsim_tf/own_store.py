@@ -24,10 +24,7 @@ class InfluxTelemetry:
 
     def write(self, telemetry: "Telemetry") -> None:
         """Places a series, with a tag that is the checksum of its content, so that other series at the place stay apart."""
-        import pandas as pd
-
-        self.written = telemetry
-        self.times = pd.Timestamp(telemetry.start).as_unit("ns").value + np.round(1e9 * telemetry.time).astype(np.int64)
+        self.written, self.times = telemetry, telemetry.stamps.as_unit("ns").asi8
         content = f"{zlib.crc32(self.times.tobytes() + telemetry.values.tobytes()):08x}"
         self.store = InfluxStore(dataclasses.replace(self.location, tags=(*self.location.tags, ("run", content))))
         self.store.write(self.times, telemetry.values)

@@ -42,6 +42,11 @@ class Telemetry:
         """Seconds since the start of the whole series, float64 of shape `(samples,)`."""
         return self.interval * (self.first + np.arange(len(self.values), dtype=np.float64))
 
+    @property
+    def stamps(self) -> pd.DatetimeIndex:
+        """Time of each sample in UTC, to the nanosecond."""
+        return pd.Timestamp(self.start) + pd.to_timedelta(np.round(1e9 * self.time).astype(np.int64), unit="ns")
+
     def part(self, first: int, stop: int) -> "Telemetry":
         """The samples from `first` up to `stop`."""
         return dataclasses.replace(self, values=self.values[first:stop], first=self.first + first)
@@ -65,9 +70,7 @@ class ParquetStore:
 
     def write(self, telemetry: Telemetry) -> None:
         """Writes the series with the time of each sample."""
-        start = pd.Timestamp(telemetry.start)
-        times = start + pd.to_timedelta(np.round(1e9 * telemetry.time).astype(np.int64), unit="ns")
-        table = pd.DataFrame({"time": times, "value": telemetry.values})
+        table = pd.DataFrame({"time": telemetry.stamps, "value": telemetry.values})
         table.attrs = {"interval": telemetry.interval, "start": telemetry.start, "name": telemetry.name}
         table.to_parquet(self.path)
 

@@ -1,4 +1,4 @@
-"""A detector with the interface of scikit-learn's outlier detectors, which runs in a `Pipeline`, and with what PyOD's detectors know after a fit."""
+"""A detector with the interface of scikit-learn's outlier detectors, which runs in a `Pipeline`, and with PyOD's attributes after a fit."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
     def fit(self, X: np.ndarray, y: Any = None) -> "TelemetryDetector":  # noqa: N803  as scikit-learn names it
         """Fits simulator and detector to nominal telemetry of shape `(samples, channels)`; `y` is not used.
 
-        As in PyOD, `decision_scores_` and `labels_` are then the scores of the samples, higher for anomalous ones, and 1 above `threshold_`.
+        As in PyOD, `decision_scores_` then has the scores of the samples, higher for anomalous ones, and `labels_` is 1 above `threshold_`.
 
         Raises:
             InputError: If the telemetry is constant or too short.

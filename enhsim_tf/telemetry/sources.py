@@ -33,7 +33,8 @@ def read_source(source: Source, columns: Sequence[str] | None = None, time: str 
 
     Returns:
         Raw channels by name, in the order of the source. A channel with times has a `DatetimeIndex`, with NaT where a time is
-        missing; a channel without times has a `RangeIndex`. The dictionary also has the whole `table` and the `commands` of an array, see `Channels`.
+        missing; a channel without times has a `RangeIndex`. The dictionary also has the whole `table` and the `commands` of an array, see
+        `Channels`.
 
     Raises:
         InputError: If the source cannot be read, or a column does not exist.

@@ -90,8 +90,8 @@ def publish(table: pd.DataFrame) -> dict[str, Any]:
         if not claim.is_tested:
             decided["verdict"] = OF_UNTESTED.get(decided["verdict"], decided["verdict"])
         values = reference[reference["claim"] == claim.id].groupby("name")["value"]
-        limited = dict.fromkeys(limit.name for limit in claim.limits)
-        ranges = {name: [float(values.min()[name]), float(values.max()[name])] for name in limited}
+        low, high = values.min(), values.max()
+        ranges = {name: [float(low[name]), float(high[name])] for name in dict.fromkeys(limit.name for limit in claim.limits)}
         claims[claim.id] = decided | {"ranges": ranges}
     tested = [claims[claim.id]["verdict"] for claim in CLAIMS if claim.is_tested]
     sign = "[¬Re]" if NOT_REPRODUCED in tested else "[Re]" if set(tested) == {REPRODUCED} else "[Re, in part]"

@@ -253,11 +253,13 @@ def _are_compact_dates(values: np.ndarray) -> bool:
 def _joined(frame: pd.DataFrame, kinds: Mapping[str, str], dates: list[str], numbers: Mapping[str, np.ndarray]) -> Clock | None:
     """Returns the clock that a column of dates and columns of the time of day, in text or whole numbers, make together, or None."""
     hours, digits = [name for name in kinds if kinds[name] == "times of day"], {}
+    if len(dates) != 1 or len(hours) > 1:
+        return None
     for name, values in numbers.items():
         part = _PART_OF.get(name.casefold())
         if part in _MOST and ((values >= 0) & (values <= _MOST[part]) & (values % 1 == 0)).all():
             digits[part] = pd.Series(values, name=name).map(f"{{:0{len(str(_MOST[part]))}.0f}}".format)
-    if len(dates) != 1 or len(hours) > 1 or not (hours or digits):
+    if not (hours or digits):
         return None
     cells, pieces = frame[dates[0]], [(".", digits["ms"])] if "ms" in digits else []
     if not (is_day := _has_no_time(cells)):
