@@ -1,9 +1,15 @@
-"""One series in InfluxDB 2, the kind of database at the end of the paper's pipeline."""
+"""One series in InfluxDB 2, the kind of database at the end of the paper's pipeline, through the official client, an optional extra.
+
+Every failure raises an `InputError` of one line. Only the client holds the token: no message, log or pickled copy of a store contains it.
+"""
 
 import dataclasses
+import itertools
+import os
+import re
 import urllib.parse
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -11,7 +17,13 @@ from enhsim_tf.common.errors import InputError
 
 SCHEME = "influxdb://"
 BATCH = 5_000  # points in one request
+VARIABLES = ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG")
+
+_Answer = TypeVar("_Answer")
 _SHOWN = 3  # number of series listed in a message
+_RANGE = "start: time(v: -9223372036000000000), stop: time(v: 9223372036854775806)"  # all times that InfluxDB has, from a whole second
+_URL = r"https?://(?:[\w.-]+|\[[\da-fA-F:.]+\])(?::[1-9]\d{0,4})?(?:/[!-~]*)?"  # without a name or a password
+_MAY_PASS = (408, 429, 500, 502, 503, 504)  # HTTP status codes of a server that is busy or still starting
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,25 +68,25 @@ class InfluxStore:
     """A series in InfluxDB 2.
 
     The server is set by the environment variables of the official client: `INFLUXDB_V2_URL`, `INFLUXDB_V2_TOKEN` and
-    `INFLUXDB_V2_ORG`, and optional ones such as `INFLUXDB_V2_TIMEOUT` and `INFLUXDB_V2_SSL_CA_CERT`.
+    `INFLUXDB_V2_ORG`, and optional ones such as `INFLUXDB_V2_TIMEOUT` and `INFLUXDB_V2_SSL_CA_CERT`. If a server that has answered stops
+    answering, the client asks it again for a minute; one that has not answered is not waited for.
 
     Args:
         location: The location, as `influxdb://bucket/measurement/field?tag=value` or as an `InfluxLocation`.
-        max_retry_s: How long to retry if a server that has answered before stops answering, in seconds.
 
     Raises:
         InputError: If the location or a variable cannot be used, or if the client is not installed.
     """
 
-    def __init__(self, location: str | InfluxLocation, max_retry_s: float = 60.0):
+    def __init__(self, location: str | InfluxLocation):
         self.location = parse_location(str(location))
         try:
-            from enhsim_tf.telemetry.influx_client import InfluxServer
+            import influxdb_client  # noqa: F401
         except ImportError:
             raise InputError(
                 "Expected the package influxdb-client. Received: it is not installed. Run python -m pip install influxdb-client."
             ) from None
-        self.server = InfluxServer(self.location.bucket, max_retry_s)
+        self.url, self.organisation = _check_variables()
 
     def __repr__(self) -> str:
         return f"InfluxStore({str(self.location)!r})"
@@ -85,7 +97,8 @@ class InfluxStore:
         Raises:
             InputError: If the server does not answer, does not accept the token, or has no such organisation or bucket.
         """
-        self.server.ask(f"{self.server.points({}, 0, 1)} |> limit(n: 1)")
+        query = f"from(bucket: {_quote(self.location.bucket)}) |> range(start: time(v: 0), stop: time(v: 1)) |> limit(n: 1)"
+        self._request(lambda client: client.query_api().query(query))
 
     def write(self, times: np.ndarray, values: np.ndarray) -> None:
         """Writes points. A point that is written twice is stored once, so an interrupted write can be repeated.
@@ -98,6 +111,7 @@ class InfluxStore:
             InputError: If InfluxDB cannot store a value or a name, or if the server does not accept the points.
         """
         from influxdb_client import Point
+        from influxdb_client.client.write_api import SYNCHRONOUS
 
         place = self.location
         bad = np.flatnonzero(~np.isfinite(values))
@@ -114,38 +128,108 @@ class InfluxStore:
             )
         point = {"measurement": place.measurement, "tags": dict(place.tags), "fields": {place.field: True}}
         begin = Point.from_dict(point).to_line_protocol().removesuffix("true")
-        for first in range(0, len(values), BATCH):
-            # float32 to float64 is exact, and so is the shortest decimal form of the float64
-            batch = zip(*(array[first : first + BATCH].tolist() for array in (values, times)), strict=True)
-            self.server.send("\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch]))
 
-    def chunks(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Streams the points of the only series at the location, whichever program wrote it, in blocks of some ten thousand points.
+        def send(client: Any) -> None:
+            api = client.write_api(SYNCHRONOUS)  # its own writer of data frames is not used: it evaluates the names of tags as code
+            for first in range(0, len(values), BATCH):
+                # float32 to float64 is exact, and so is the shortest decimal form of the float64
+                batch = zip(*(array[first : first + BATCH].tolist() for array in (values, times)), strict=True)
+                lines = "\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch])
+                api.write(place.bucket, record=lines.encode(), write_precision="ns")
 
-        Yields:
+        self.check()
+        self._request(send, retries=16)
+
+    def read(self) -> tuple[np.ndarray, np.ndarray]:
+        """Reads all points of the only series at the location, whichever program wrote it.
+
+        Returns:
             Times in nanoseconds since 1970 (int64), which increase, and values (float64), two arrays of the same length.
 
         Raises:
             InputError: If there is no series, more than one, or one without numbers, or if the server does not answer.
         """
+        from influxdb_client import Dialect
+
         wanted = {"_measurement": self.location.measurement, "_field": self.location.field} | dict(self.location.tags)
-        rows = self.server.ask(f"{self.server.points(wanted)} |> first()", _SHOWN)
-        found = [str(dataclasses.replace(self.location, tags=tuple(sorted(_tags_of(row).items())))) for row in rows]
-        if len(found) > 1:
-            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {' or '.join(found)}.")
-        if not found:
+        matches = " and ".join(f"r[{_quote(column)}] == {_quote(value)}" for column, value in wanted.items())
+        points = f"from(bucket: {_quote(self.location.bucket)}) |> range({_RANGE}) |> filter(fn: (r) => {matches})"
+        rows = self._request(lambda client: list(itertools.islice(client.query_api().query_stream(f"{points} |> first()"), _SHOWN)))
+        tags = [
+            {key: value for key, value in row.values.items() if not key.startswith("_") and key not in ("result", "table")} for row in rows
+        ]
+        if len(rows) > 1:
+            found = " or ".join(str(dataclasses.replace(self.location, tags=tuple(sorted(each.items())))) for each in tags)
+            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {found}.")
+        if not rows:
             raise InputError(f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags.")
-        yield from self.server.stream(wanted)
+        query, plain = f'{points} |> keep(columns: ["_time", "_value"])', Dialect(annotations=[])
+        return _parse(self._request(lambda client: client.query_api().query_raw(query, dialect=plain).read(), retries=16))
 
-    def read(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns all points of the series at once, see `chunks`."""
-        times, values = zip(*self.chunks(), strict=True)
-        return np.concatenate(times), np.concatenate(values)
+    def _request(self, request: Callable[[Any], _Answer], retries: int = 0) -> _Answer:
+        """Calls a function with the client, which repeats what may pass; raises an `InputError` if that does not succeed."""
+        from influxdb_client import InfluxDBClient
+        from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
+        from influxdb_client.rest import ApiException
+        from urllib3 import Retry
+        from urllib3.exceptions import HTTPError
+
+        options = {"redirect": False, "allowed_methods": None, "status_forcelist": _MAY_PASS, "raise_on_status": False}
+        try:
+            client = InfluxDBClient.from_env_properties(retries=Retry(retries, backoff_factor=0.1, backoff_max=5, **options))
+            return request(client)
+        except (ApiException, FluxQueryException, FluxCsvParserException, HTTPError, OSError) as error:
+            status = getattr(error, "status", None)
+            said = " ".join(str(getattr(error, "message", None) if status else getattr(error, "reason", error)).split())[:300]
+            if status == 401:
+                words = f"Expected a token that {self.url} knows. Received: another in {VARIABLES[1]}. Copy it again."
+            elif isinstance(error, FluxCsvParserException) or (status == 404 and "not" not in said):
+                words = f"Expected an InfluxDB 2 server at {self.url}. Received: an answer of something else. Correct {VARIABLES[0]}."
+            elif isinstance(error, HTTPError | OSError):
+                words = f"Expected an InfluxDB 2 server at {self.url}. Received: no answer. Start it or correct {VARIABLES[0]}."
+            else:
+                words = (
+                    f"Expected a request that {self.url} accepts, to bucket {self.location.bucket!r} of {VARIABLES[2]}={self.organisation!r}. "
+                    f"Received: {said} ({status or 'query'}). Correct the names, or give the token the right."
+                )
+        except ValueError:
+            words = "Expected numbers in INFLUXDB_V2_TIMEOUT and INFLUXDB_V2_CONNECTION_POOL_MAXSIZE. Received: others. Correct them."
+        raise InputError(words)  # outside the except block: the client's own error, which may contain the token, is not chained
 
 
-def _tags_of(row: Mapping[str, Any]) -> dict[str, str]:
-    """The tags of a row of a query result: all columns except the time, the value and those that InfluxDB adds."""
-    return {key: value for key, value in row.items() if not key.startswith("_") and key not in ("result", "table")}
+def _check_variables() -> tuple[str, str]:
+    """Checks the environment variables that the client reads, whose own errors would show the token; returns URL and organisation."""
+    missing = [name for name in VARIABLES if not os.environ.get(name, "").strip()]
+    if missing:
+        raise InputError(f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them.")
+    url, token, organisation = (os.environ[name] for name in VARIABLES)
+    if not re.fullmatch(_URL, url):
+        raise InputError(
+            "Expected INFLUXDB_V2_URL like http://localhost:8086, without a name or a password. Received: another. Correct it."
+        )
+    if not (token.isascii() and token.isprintable()):
+        raise InputError("Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: a line break or other characters in it. Copy it again.")
+    return url.rstrip("/"), organisation
+
+
+def _parse(answer: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Parses the CSV of an answer as times and values. The client's own parser cuts times to microseconds."""
+    import pyarrow as pa
+    import pyarrow.csv
+
+    types = {"_time": pa.timestamp("ns", "UTC"), "_value": pa.float64()}
+    convert = pyarrow.csv.ConvertOptions(column_types=types, include_columns=list(types))
+    try:
+        table = pyarrow.csv.read_csv(pa.BufferReader(answer), convert_options=convert)
+    except pa.ArrowException as error:
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"Expected a field of numbers. Received: {reason}. Name another field, or see the server's log.") from None
+    return table["_time"].cast(pa.int64()).to_numpy(), table["_value"].to_numpy()
+
+
+def _quote(text: str) -> str:
+    """Quotes a text as a Flux string. Characters that could end it or start an interpolated expression are escaped as hex codes."""
+    return '"' + re.sub(r'[\\"$\x00-\x1f\x7f]', lambda found: f"\\x{ord(found[0]):02x}", text) + '"'
 
 
 def _encode(part: str) -> str:

@@ -1,6 +1,5 @@
 """Tests of the InfluxDB store without a server: locations, answers, and refusals in one line before any work."""
 
-import io
 import subprocess
 import sys
 import threading
@@ -9,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry import influx_client
-from enhsim_tf.telemetry.influx_client import VARIABLES
-from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore, parse_location
+from enhsim_tf.telemetry import influx_store
+from enhsim_tf.telemetry.influx_store import VARIABLES, InfluxLocation, InfluxStore, parse_location
 
 ROOT = Path(__file__).parents[2]
 POINTS = np.arange(3), np.ones(3, np.float32)
@@ -42,12 +40,6 @@ def test_invalid_locations_are_refused(rest, refused):
         parse_location("http://b/m/f")
 
 
-class Answer(io.BytesIO):
-    """The answer of a server, as urllib3 gives it."""
-
-    auto_close = True
-
-
 HEAD, ROW = b",result,table,_time,_value\r\n", b",_result,0,1970-01-01T00:00:01.%09dZ,%s\r\n"
 
 
@@ -64,7 +56,7 @@ ODD = {
 @pytest.mark.parametrize("name", ODD)
 def test_an_answer_without_numbers_is_refused(name, refused):
     with refused("a field of numbers"):
-        list(influx_client._blocks(Answer(ODD[name])))
+        influx_store._parse(ODD[name])
 
 
 @pytest.mark.parametrize("name", VARIABLES)
@@ -75,7 +67,7 @@ def test_a_missing_variable_is_named(pretended, monkeypatch, refused, name):
 
 
 def test_a_missing_client_is_named(pretended, monkeypatch, refused):
-    monkeypatch.setitem(sys.modules, "enhsim_tf.telemetry.influx_client", None)
+    monkeypatch.setitem(sys.modules, "influxdb_client", None)
     with refused("pip install influxdb-client"):
         InfluxStore("influxdb://b/m/f")
 
@@ -94,7 +86,7 @@ def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
 @pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read(), lambda store: store.write(*POINTS)])
 def test_a_server_that_is_down_is_reported_at_once(pretended, refused, use):
     with refused("http://127.0.0.1:9", "no answer"):
-        use(InfluxStore("influxdb://b/m/f", max_retry_s=3_600))
+        use(InfluxStore("influxdb://b/m/f"))
 
 
 def test_a_nonnumeric_client_variable_is_refused(pretended, monkeypatch, refused):
