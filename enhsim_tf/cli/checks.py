@@ -118,14 +118,11 @@ def _refuse(options: argparse.Namespace, when: str, *names: str) -> None:
 
 def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:
     """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
-    bad = "drop" if options.drop_bad else "refuse"
-    same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill".split()
+    same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill drop_bad".split()
     return Cleaning(
         **{name: getattr(options, name) for name in same if hasattr(options, name)},
         interval_s=getattr(options, "interval", None),
         labelled=labelled,
         missing_values=tuple(value for values in options.missing_values for value in values.split(",")),
-        on_bad_times=bad,
-        on_bad_values=bad,
         min_part=min_part,
     )

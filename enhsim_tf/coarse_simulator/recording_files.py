@@ -42,8 +42,7 @@ def read_recording(
         source: A source of telemetry, see `sources.read_source`.
         columns: Names of the columns that are inputs of the enhancer. None: all columns that hold numbers.
         time: Name of a table's time column. None: it is detected.
-        cleaning: How problems are treated. None: the defaults. Of several values at one time, as at an event, the last is taken
-            unless `same_time` says otherwise.
+        cleaning: How problems are treated. None: the defaults. Of several values at one time, as at an event, the last is taken.
         interval_s: Sampling interval that the recording is brought to. Finer recordings are averaged and coarser ones are
             interpolated, as are those with steps of any length. None: its own interval.
         start: Time of the recording's zero in UTC, as ISO 8601 text, if its times count from zero. None: they are those of the telemetry.
@@ -54,11 +53,9 @@ def read_recording(
     Raises:
         InputError: If the source cannot be read, a column is missing, or the columns have no time in common.
     """
-    cleaning, name = cleaning or Cleaning(), "the coarse run"
+    cleaning, name = dataclasses.replace(cleaning or Cleaning(), same_time="last"), "the coarse run"
     if not isinstance(source, pd.DataFrame | pd.Series):
         name = printable(Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name)
-    if cleaning.same_time is None:
-        cleaning = dataclasses.replace(cleaning, same_time="last")
     given = read_source(source, columns, time, cleaning)
     raw, stepped = _at_equal_steps(given, interval_s, cleaning)
     names, cleaned = list(raw), {each: clean(raw[each], cleaning) for each in raw}
@@ -124,18 +121,17 @@ def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, clea
     grid = times[0] + np.round(np.arange(np.floor((times[-1] - times[0]) / interval + 1e-6) + 1) * interval).astype(np.int64)
     return {name: _interpolated(series, grid, cleaning) for name, series in raw.items()}, (
         f"steps from {steps.min() / 1e9:.4g} s to {steps.max() / 1e9:.4g} s, interpolated to one every {interval / 1e9:.6g} s; "
-        f"of {len(first) - len(times):,} rows at the time of another, the {cleaning.same_time} was taken"
+        f"of {len(first) - len(times):,} rows at the time of another, the last was taken"
     )
 
 
 def _interpolated(series: pd.Series, grid: np.ndarray, cleaning: Cleaning) -> pd.Series:
     """Interpolates a series linearly at times in nanoseconds."""
     decimal, places = cleaning.decimal or series.attrs.get("decimal"), series.attrs.get("places", ROWS)
-    values, _, _ = parse_numbers(series, str(series.name), cleaning.on_bad_values == "drop", decimal, cleaning.missing_values, places)
+    values, _, _ = parse_numbers(series, str(series.name), cleaning.drop_bad, decimal, cleaning.missing_values, places)
     times = series.index.as_unit("ns").asi8
     there = np.isfinite(values) & series.index.notna()
-    groups = pd.Series(values[there]).groupby(times[there])
-    known = groups.mean() if cleaning.same_time == "mean" else groups.last()
+    known = pd.Series(values[there]).groupby(times[there]).last()
     if not len(known):
         return series
     inside = grid[(grid >= known.index[0]) & (grid <= known.index[-1])]

@@ -28,7 +28,7 @@ def use(source):
             assert all(line.isprintable() for line in (*cleaned.report.lines(), json.dumps(cleaned.report.to_dict(), allow_nan=False)))
             assert all(np.isfinite(part.values).all() and len(part) for part in cleaned.parts)
 
-    all_of(lambda: channels(Cleaning()), lambda: channels(Cleaning(interval_s=1.0, on_bad_times="drop", on_bad_values="drop")))
+    all_of(lambda: channels(Cleaning()), lambda: channels(Cleaning(interval_s=1.0, drop_bad=True)))
 
 
 def read_file(name, data, folder):

@@ -83,7 +83,7 @@ def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
     """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a killed recorder."""
     rows = ["{}:00,1", ",2", "{}:01,3", "boot,4", "{}:01,3", "{}:02,5", "{}:03"]
     (tmp_path / "a.csv").write_text("\n".join(["time,volts", *rows]).replace("{}", "2020-03-01T00:00"))
-    channel = read_source(tmp_path / "a.csv", options=Cleaning(on_bad_times="drop"))["volts"]
+    channel = read_source(tmp_path / "a.csv", options=Cleaning(drop_bad=True))["volts"]
     report = clean(channel).report
     assert (report.rows_in, report.rows_used, report.rows_left_out, report.samples) == (7, 3, 4, 3)
     found = {finding.kind: finding.count for finding in report.findings}

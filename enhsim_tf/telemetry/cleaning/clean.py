@@ -59,7 +59,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     name = "telemetry" if not is_series or series.name is None else str(series.name)
     about = series.attrs if is_series else {}
     places, decimal = about.get("places", ROWS), options.decimal or about.get("decimal")
-    values, bad, noted = parse_numbers(series, name, options.on_bad_values == "drop", decimal, options.missing_values, places)
+    values, bad, noted = parse_numbers(series, name, options.drop_bad, decimal, options.missing_values, places)
     if not len(values):
         raise InputError(f"Expected samples. Received: none from {name}. Give a source that holds a series.")
     has_time = is_series and not isinstance(series.index, pd.RangeIndex)
@@ -90,7 +90,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
 def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
     """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
     places = about.get("places", ROWS)
-    parsed = parse_times(index, f"the times of {name}", options.on_bad_times == "drop", options.time_format, places)
+    parsed = parse_times(index, f"the times of {name}", options.drop_bad, options.time_format, places)
     stamps, bad, column = parsed.stamps, parsed.bad, "the index" if index.name is None else repr(str(index.name))
     clock = about.get("clock") or {"column": column, "form": parsed.form, "zone": parsed.zone, "counts": parsed.counts}
     had_time = stamps.notna()

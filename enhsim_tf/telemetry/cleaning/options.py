@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from enhsim_tf.common.errors import InputError
 
 _CHOICES = {
-    "on_bad_times": ("refuse", "drop"),
-    "on_bad_values": ("refuse", "drop"),
-    "same_time": (None, "mean", "last"),
+    "same_time": ("mean", "last"),
     "fill": ("linear", "hold"),
     "labelled": ("keep", "missing"),
     "decimal": (None, ".", ","),
@@ -31,13 +29,11 @@ class Cleaning:
             local clock does, then raise an `InputError`.
         time_format: How times are written: a format as for `datetime.strptime`, or for numbers their unit ("D", "h", "min", "s", "ms",
             "us", "ns", since 1970 or any other zero) or kind of day ("excel", "mjd", "jd", "datenum"). None: detected.
-        on_bad_times: Treatment of times that cannot be read: "refuse" raises an `InputError`, "drop" drops their rows.
-        on_bad_values: Treatment of values that cannot be read: "refuse" raises an `InputError`, "drop" treats them as missing.
+        drop_bad: Whether values and times that cannot be read are dropped and counted, instead of raising an `InputError`.
         decimal: Decimal sign, "." or ",". The other sign then separates thousands. None: decided from all columns of a file.
         missing_values: Values that mean "no value", numbers or text, such as `(-999.9, "offline")`.
-        same_time: Treatment of different values at the same time: take their "mean" or the "last". None: the mean, unless it would merge most rows.
-        max_jitter: Largest distance of a time from the regular grid, in intervals, at most 0.5. The series is split where the
-            distance is larger.
+        same_time: Treatment of different values at the same time: take their "mean", which without `interval_s` must not merge most rows, or
+            the "last".
         max_fill: Longest gap that is filled, in samples. The series is split at longer gaps. None: 5, or 1,000,000 with
             `fill="hold"`.
         fill: How gaps are filled: "linear", by straight lines, or "hold", with the last value before the gap, for telemetry that is
@@ -56,12 +52,10 @@ class Cleaning:
     interval_s: float | None = None
     timezone: str | None = None
     time_format: str | None = None
-    on_bad_times: str = "refuse"
-    on_bad_values: str = "refuse"
+    drop_bad: bool = False
     decimal: str | None = None
     missing_values: Sequence[float | str] = ()
-    same_time: str | None = None
-    max_jitter: float = 0.25
+    same_time: str = "mean"
     max_fill: int | None = None
     fill: str = "linear"
     min_part: int = 2
@@ -77,8 +71,8 @@ class Cleaning:
                 raise InputError(f"Expected {name}, one of: {', '.join(filter(None, choices))}. Received: {name}={getattr(self, name)!r}.")
         if self.interval_s is not None and not 1e-9 <= self.interval_s <= 1e9:
             raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
-        if not (0 <= self.max_jitter <= 0.5 and self.longest_gap >= 0 and self.min_part >= 1):
-            raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
+        if self.longest_gap < 0 or self.min_part < 1:
+            raise InputError(f"Expected max_fill >= 0, min_part >= 1. Received: {self}.")
         form, units = self.time_format, (*UNITS_NS, *DAYS)
         if form is not None and form not in units and "%" not in form:
             raise InputError(

@@ -16,6 +16,7 @@ from enhsim_tf.telemetry.windows import runs_of
 
 _ALIKE = (0.8, 1.25)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
 _RUN = 4  # smallest number of consecutive steps that form a stretch with another rate
+_MAX_JITTER = 0.25  # largest distance of a time from the regular grid, in intervals; the series is split where it is larger
 _LEAST_REGULAR = 0.4  # share of the steps that are whole numbers of intervals; random times reach 0.25
 
 
@@ -60,8 +61,8 @@ def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options
     Returns:
         The parts, the number of rows that their samples represent, and the interval in nanoseconds.
     """
-    rows = _drop_missing_values(_drop_duplicate_times(rows, bad, log, name, options), bad, log, name)
-    holds, longest = options.fill == "hold", options.longest_gap + 1
+    rows = _drop_duplicate_times(_drop_missing_values(rows, bad, log, name), log, name, options)
+    holds = options.fill == "hold"
     by_interval = options.interval_s is not None or holds
     if log.times is None:
         interval = 1e9
@@ -84,9 +85,9 @@ def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options
             by_interval = True
             usual = f"one every {interval / 1e9:.6g} s, to which they are averaged or filled"
             log.add("other rates", rows.source_row[other], f"rows in stretches of another rate than {usual}: {{count}}")
-    segments = _binned(rows.times, interval, longest) if by_interval else _regular(rows.times, interval, options.max_jitter, longest)
-    same_place = "last" if holds else "mean" if by_interval else options.same_time or "mean"
-    parts, used = _build_parts(rows, segments, interval, log, name, same_place, options)
+    segments = _segments(rows.times, interval, options.longest_gap + 1, by_interval)
+    how = "last" if holds else "mean" if by_interval else options.same_time
+    parts, used = _build_parts(rows, segments, interval, log, name, how, options)
     return parts, used, interval
 
 
@@ -143,40 +144,6 @@ def _have_other_rate(times: np.ndarray, interval: float) -> np.ndarray:
     return marks
 
 
-def _drop_duplicate_times(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> Rows:
-    """Keeps one row for each time. A mean that would merge most rows must be asked for."""
-    same_time = options.same_time
-    values = np.where(bad[rows.source_row], np.inf, rows.values)  # an unreadable value is not a duplicate of a missing one
-    is_copy = pd.DataFrame({"time": rows.times, "value": values}).duplicated().to_numpy()
-    copies = rows.source_row[is_copy]
-    log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
-    rows = rows.take(~is_copy)
-    kept, left = _merge_groups(rows, rows.times, same_time or "mean")
-    if same_time is None and options.interval_s is None and 2 * len(left) >= len(rows) > 2:
-        raise InputError(
-            f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
-            "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval) or same_time='mean'."
-        )
-    text = f"rows with another value at the same time, of which the {same_time or 'mean'} was taken: {{count}}"
-    log.add("same time", left, text, rows_left_out=len(left))
-    return kept
-
-
-def _merge_groups(rows: Rows, groups: np.ndarray, how: str) -> tuple[Rows, np.ndarray]:
-    """Merges each group of neighbouring rows into one row; also returns the source rows that were merged into others."""
-    if not np.any(groups[1:] == groups[:-1]):
-        return rows, rows.source_row[:0]
-    has_value = np.isfinite(rows.values)
-    order = np.arange(len(rows)) * (-1 if how == "last" else 1)
-    ranked = np.lexsort((order, ~has_value, groups))  # within each group, rows with a value come first
-    chosen = ranked[np.flatnonzero(np.diff(groups[ranked], prepend=groups[ranked[0]] - 1))]
-    kept = rows.take(chosen)
-    if how != "last":
-        means = pd.Series(np.where(has_value, rows.values, np.nan)).groupby(groups).mean().to_numpy()
-        kept.values = np.where(np.isfinite(means), means, kept.values)
-    return kept, np.delete(rows.source_row, chosen)
-
-
 def _drop_missing_values(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str) -> Rows:
     """Drops rows without a finite value."""
     has_value = np.isfinite(rows.values)
@@ -188,61 +155,70 @@ def _drop_missing_values(rows: Rows, bad: np.ndarray, log: CleaningLog, name: st
     return rows.take(has_value)
 
 
-def _regular(times: np.ndarray, interval: float, max_jitter: float, max_step: int) -> list[_Segment]:
-    """Splits a series, also at jumps of the clock, into segments on regular grids with the same interval and individual start times."""
-    ratios = np.diff(times) / interval
-    numbers = np.round(ratios)
-    whole = (numbers <= max_step) & (np.abs(ratios - numbers) <= 2 * max_jitter + 1e-9)
-    segments = []
-    for start, stop in _between(~whole):
-        all_places = np.concatenate([[0], np.cumsum(numbers[start : stop - 1])]).astype(np.int64)
-        all_off = (times[start:stop] - times[start]) - all_places * interval
-        first = 0
-        while first < stop - start:
-            end = first + _end_of_spread(all_off[first:], 2 * max_jitter * interval + 0.5)
-            places, off = all_places[first:end] - all_places[first], all_off[first:end] - all_off[first]
-            middle = float(np.median(off))
-            if np.abs(off - middle).max() > max_jitter * interval:
-                middle = float(off.max() + off.min()) / 2
-            segments.append(_Segment(slice(start + first, start + end), places, float(times[start + first]) + middle, off - middle))
-            first = end
-    return segments
+def _drop_duplicate_times(rows: Rows, log: CleaningLog, name: str, options: Cleaning) -> Rows:
+    """Keeps one row for each time. A mean that would merge most rows must be asked for, by an interval."""
+    is_copy = pd.DataFrame({"time": rows.times, "value": rows.values}).duplicated().to_numpy()
+    copies = rows.source_row[is_copy]
+    log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
+    rows = rows.take(~is_copy)
+    kept, left = _merge_groups(rows, rows.times, options.same_time)
+    if options.same_time == "mean" and options.interval_s is None and 2 * len(left) >= len(rows) > 2:
+        raise InputError(
+            f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
+            "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval)."
+        )
+    text = f"rows with another value at the same time, of which the {options.same_time} was taken: {{count}}"
+    log.add("same time", left, text, rows_left_out=len(left))
+    return kept
 
 
-def _between(breaks: np.ndarray) -> list[tuple[int, int]]:
-    """First row and end (exclusive) of each run of rows, where `breaks` marks the steps between rows at which a run ends."""
-    edges = [0, *(np.flatnonzero(breaks) + 1).tolist(), len(breaks) + 1]
-    return list(zip(edges[:-1], edges[1:], strict=True))
+def _merge_groups(rows: Rows, groups: np.ndarray, how: str) -> tuple[Rows, np.ndarray]:
+    """Merges each group of neighbouring rows into one row; also returns the source rows that were merged into others."""
+    edges = np.flatnonzero(np.diff(groups)) + 1
+    first, last = np.append(0, edges), np.append(edges, len(rows)) - 1
+    kept = rows.take(last if how == "last" else first)
+    if how != "last":
+        kept.values = np.add.reduceat(rows.values, first) / (last - first + 1)
+    return kept, np.setdiff1d(rows.source_row, kept.source_row)
 
 
-def _end_of_spread(values: np.ndarray, spread: float) -> int:
-    """Length of the longest prefix of `values` whose range is at most `spread`."""
-    low = high = values[0]
-    size, begin = 1_024, 0
-    while begin < len(values):
-        block = values[begin : begin + size]
-        lows, highs = np.minimum(np.minimum.accumulate(block), low), np.maximum(np.maximum.accumulate(block), high)
-        wide = highs - lows > spread
-        if wide.any():
-            return begin + int(np.argmax(wide))
-        low, high = lows[-1], highs[-1]
-        begin, size = begin + size, 2 * size
-    return len(values)
+def _segments(times: np.ndarray, interval: float, max_step: int, by_interval: bool) -> list[_Segment]:
+    """Splits a series at gaps of more than `max_step` intervals and assigns every row to a point of a regular grid.
 
-
-def _binned(times: np.ndarray, interval: float, max_step: int) -> list[_Segment]:
-    """Splits a series at its long gaps and assigns every row to the nearest point of one grid that starts at the first row."""
-    places = np.round((times - times[0]) / interval).astype(np.int64)
-    segments = []
-    for start, stop in _between(np.diff(places) > max_step):
-        begin = float(times[0]) + places[start] * interval
+    With `by_interval`, this is the nearest point of one grid that starts at the first row. Otherwise each segment has a grid of its own,
+    and the series is also split where its times leave that grid, as at a jump of the clock.
+    """
+    if by_interval:
+        places = np.round((times - times[0]) / interval).astype(np.int64)
+    else:
+        places = np.append(0, np.cumsum(np.round(np.diff(times) / interval))).astype(np.int64)
+    breaks = np.append(np.diff(places) > max_step, True)
+    if not by_interval:
+        breaks[:-1] |= _leave_grid(times - places * interval, breaks, 2 * _MAX_JITTER * interval + 0.5)
+    segments, stops = [], np.flatnonzero(breaks) + 1
+    for start, stop in zip([0, *stops[:-1].tolist()], stops.tolist(), strict=True):
         inside = places[start:stop] - places[start]
-        segments.append(_Segment(slice(start, stop), inside, begin, times[start:stop] - begin - inside * interval))
+        off = times[start:stop] - times[start] - inside * interval
+        middle = float(np.median(off)) if not by_interval else times[0] + places[start] * interval - times[start]
+        if not by_interval and np.abs(off - middle).max() > _MAX_JITTER * interval:
+            middle = float(off.max() + off.min()) / 2
+        segments.append(_Segment(slice(start, stop), inside, float(times[start]) + middle, off - middle))
     return segments
+
+
+def _leave_grid(off: np.ndarray, breaks: np.ndarray, spread: float) -> np.ndarray:
+    """Marks the steps at which segments must end, so that the distances from the grid within each one differ by at most `spread`."""
+    marks = np.zeros(len(off) - 1, bool)
+    low = high = off[0]
+    for step, (value, is_break) in enumerate(zip(off[1:].tolist(), breaks[:-1].tolist(), strict=True)):
+        low, high = min(low, value), max(high, value)
+        if is_break or high - low > spread:
+            marks[step], low, high = True, value, value
+    return marks
 
 
 def _build_parts(
-    rows: Rows, segments: Sequence[_Segment], interval: float, log: CleaningLog, name: str, same_place: str, options: Cleaning
+    rows: Rows, segments: Sequence[_Segment], interval: float, log: CleaningLog, name: str, how: str, options: Cleaning
 ) -> tuple[list[Part], int]:
     """Builds regular parts, fills their short gaps, and counts the rows that they use. Of several rows at one grid point, one is kept."""
     parts, used, merged, short, gaps, num_filled = [], 0, [], [], [], 0
@@ -253,7 +229,7 @@ def _build_parts(
             short.append(inside.source_row)
             continue
         off[segment.rows] = segment.off
-        inside, left = _merge_groups(inside, segment.places, same_place)
+        inside, left = _merge_groups(inside, segment.places, how)
         merged.append(left)
         places, samples = np.unique(segment.places), np.arange(length)
         previous = np.searchsorted(places, samples, "right") - 1
@@ -271,13 +247,13 @@ def _build_parts(
     _log_breaks(rows, segments, interval, log, options.longest_gap)
     _log_jitter(rows, off, interval, log)
     for kind, found, text in (
-        ("averaged", merged, f"rows that share an interval with another row, of which the {same_place} was taken: {{count}}"),
+        ("averaged", merged, f"rows that share an interval with another row, of which the {how} was taken: {{count}}"),
         ("short parts", short, f"rows in parts of fewer than {options.min_part:,} samples ({len(short):,} such parts): {{count}}"),
     ):
         numbers = np.concatenate([*found, rows.source_row[:0]])
         log.add(kind, numbers, text, rows_left_out=len(numbers))
-    how = "filled with the value before them," if holds else "filled by straight lines with"
-    text = f"gaps of up to {options.longest_gap} samples, {how} {num_filled:,} samples in total: {{count}}"
+    filled = "filled with the value before them," if holds else "filled by straight lines with"
+    text = f"gaps of up to {options.longest_gap} samples, {filled} {num_filled:,} samples in total: {{count}}"
     log.add("gaps filled", np.concatenate(gaps), text, samples_filled=num_filled)
     return parts, used
 

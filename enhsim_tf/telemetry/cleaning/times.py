@@ -90,7 +90,7 @@ class _Reader:
             received = "a time out of range"
         raise InputError(
             f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {self.places.of(row)} of {self.what} "
-            f"({int(bad.sum()):,} in all). {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
+            f"({int(bad.sum()):,} in all). {then}, or leave them out with drop_bad=True (--drop-bad)."
         )
 
     def of_dates(self, times: pd.Series) -> Times:

@@ -71,7 +71,7 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
     if clock.columns:
         form = options.time_format or unit_of(clock, table.units, what)
         of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-        times = parse_times(clock.cells, of_what, options.on_bad_times == "drop", form, table.places)
+        times = parse_times(clock.cells, of_what, options.drop_bad, form, table.places)
         if not times.zone and (offset := offset_of(clock, frame, options.timezone, what)) is not None:
             times = dataclasses.replace(times, stamps=(times.stamps - offset).tz_localize("UTC"), zone="stated in its name")
     take("clock", clock.columns)
