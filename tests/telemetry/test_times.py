@@ -4,25 +4,25 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.telemetry.cleaning.times import date_forms, parse_times, refuse_days, refuse_repeated_local_hour
+from enhsim_tf.telemetry.cleaning.times import date_forms, parse_times, refuse_steps_back, refuse_two_meanings
 
 DAY = 45_000.0  # of a spreadsheet: 2023-03-15
 
 
 @pytest.mark.parametrize("step", [1 / 24, 1 / 1_440, 0.1 / 86_400])
 def test_steps_of_whole_hours_minutes_or_tenth_seconds_look_like_days(refused, step):
-    with refused("may be days or seconds", "excel (from 2023-03-15"):
-        refuse_days(DAY + step * np.arange(5), "clock")
+    with refused("may be days", "excel (from 2023-03-15"):
+        refuse_two_meanings(DAY + step * np.arange(5), "clock")
 
 
 @pytest.mark.parametrize("step", [1.0, 0.25, 0.01 / 86_400, 2.3 / 864_000])
 def test_other_steps_do_not(step):
-    refuse_days(DAY + step * np.arange(5), "clock")
+    refuse_two_meanings(DAY + step * np.arange(5), "clock")
 
 
 def test_whole_days_do_in_a_column_of_dates(refused):
-    with refused("may be days or seconds"):
-        refuse_days(DAY + np.arange(5), "date", even_whole=True)
+    with refused("may be days"):
+        refuse_two_meanings(DAY + np.arange(5), "date", is_date=True)
 
 
 def test_a_damaged_number_in_text_is_marked_and_the_others_are_read():
@@ -45,6 +45,8 @@ def test_the_form_of_dates(text, form):
 
 
 class Log:
+    counts = False
+
     def place(self, number):
         return f"row {number}"
 
@@ -53,4 +55,10 @@ class Log:
 def test_times_that_step_back_by_an_hour_are_refused(refused, minutes):
     minutes = np.array(minutes) - np.where(np.arange(len(minutes)) > len(minutes) - 4, 20, 0)  # the clock goes from 60 to 0
     with refused(f"row {len(minutes) - 3} of volts", "--timezone"):
-        refuse_repeated_local_hour(60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts")
+        refuse_steps_back(60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts", has_zone=False)
+
+
+def test_a_date_that_stays_past_midnight_is_refused_with_a_zone_too(refused):
+    minutes = np.array([1_400, 1_420, 0, 20])
+    with refused("row 2 of volts", "one day"):
+        refuse_steps_back(60 * 10**9 * minutes, np.arange(4), Log(), "volts", has_zone=True)

@@ -17,7 +17,7 @@ from enhsim_tf.telemetry.cleaning.options import Cleaning as Cleaning
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
 from enhsim_tf.telemetry.cleaning.regular_grid import Rows, regularise
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, finding_from_dict, iso_time
-from enhsim_tf.telemetry.cleaning.times import localize_times, parse_times, refuse_repeated_local_hour, refuse_restart
+from enhsim_tf.telemetry.cleaning.times import localize_times, parse_times, refuse_steps_back
 from enhsim_tf.telemetry.series import Telemetry
 
 
@@ -108,12 +108,10 @@ def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cl
     kept = np.flatnonzero(stamps.notna())
     if not len(kept):
         raise InputError(f"Expected rows with times. Received: none in {name}. Name another time column.")
-    if clock["counts"]:
-        refuse_restart(times[kept], kept, log, name)
+    if clock["counts"] or local:
+        refuse_steps_back(times[kept], kept, log, name, options.timezone is not None)
     if local:
         clock = clock | {"zone": f"{options.timezone or 'UTC'}, as none is stated"}
-        if options.timezone is None:
-            refuse_repeated_local_hour(times[kept], kept, log, name)
     elif options.timezone and clock["zone"] != "none":
         clock = clock | {"zone": f"{clock['zone']}, which goes before {options.timezone}"}
     steps = np.diff(times[kept])

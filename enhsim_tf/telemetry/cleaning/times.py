@@ -192,49 +192,37 @@ def _refuse_lost_digits(values: np.ndarray, what: str) -> None:
         )
 
 
-def refuse_days(values: np.ndarray, what: str, even_whole: bool = False) -> None:
-    """Refuses numbers that look like days of a spreadsheet or calendar: of the years 1954 to 2119, at steps of whole or tenth seconds.
+def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) -> None:
+    """Refuses numbers that may be seconds, or days, dates such as 20240301, decimal years, times of day such as 120059, or ms of a run.
 
-    With `even_whole`, whole days and tenths of days count too, as in a column whose name speaks of dates.
+    Days, of the years 1954 to 2119, are told by steps of whole or tenth seconds; `is_date` says that the column's name speaks of dates.
     """
-    ranges = ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))
-    if len(values) < 2 or not any(low <= values.min() and values.max() < high for low, high in ranges):
+    if len(values) < 2:
         return
-    step = float(np.median(np.abs(np.diff(values))))
-    seconds = step * 86_400 * 10
-    is_odd = abs(step * 1000 - round(step * 1000)) > 1e-6 and round(seconds) > 0 and abs(seconds - round(seconds)) < 0.01 * seconds
-    if not (is_odd or even_whole):
-        return
-    dates = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
-    possible = [f"{kind} (from {pd.Timestamp(round(s), unit='s')})" for kind, s in dates.items() if _YEARS_S[0] < s < _YEARS_S[1]]
-    raise InputError(
-        f"Expected times whose unit is known. Received: {values[0]:.12g} to {values[-1]:.12g} in {what}, which may be days or seconds. "
-        f"Give time_format {', '.join(possible) or 'D'}, or s (--time-format)."
-    )
-
-
-def _refuse_two_meanings(values: np.ndarray, what: str) -> None:
-    """Refuses numbers that may be seconds, or dates such as 20240301, decimal years, times of day such as 120059, or ms of a run."""
-    low, high, is_whole = values.min(), values.max(), (values == np.floor(values)).all()
+    low, high, is_whole, step = values.min(), values.max(), (values % 1 == 0).all(), float(np.median(np.abs(np.diff(values))))
     is_of_day = 1e4 <= low and high < 24e4 and low // 100 < high // 100 and max((values % 100).max(), (values // 100 % 100).max()) < 60
-    is_fine = is_whole and 0 < low < 1.2e9 and (step := np.median(np.diff(values))) >= 1_000 and step % 60 > 0
+    is_fine = is_whole and 0 < low < 1.2e9 and step >= 1_000 and step % 60 > 0
     kinds = {"decimal years": 1900 <= low and high < 2100, "hhmmss": is_of_day, "ms or us (time_format 'ms' or 'us')": is_fine}
     for digits, form in ((7, "%Y%j"), (8, "%Y%m%d"), (10, "%Y%m%d%H"), (12, "%Y%m%d%H%M"), (14, "%Y%m%d%H%M%S")):
         if is_whole and 1.9 * 10 ** (digits - 1) <= low and high < 2.2 * 10 ** (digits - 1):
             text = pd.Series(values[:1_000].astype(np.int64).astype(str))
             kinds[f"dates (time_format {form!r})"] = pd.to_datetime(text, format=form, errors="coerce").notna().all()
+    tenths = step * 864_000
+    is_odd = abs(step * 1000 - round(step * 1000)) > 1e-6 and round(tenths) > 0 and abs(tenths - round(tenths)) < 0.01 * tenths
+    if any(first <= low and high < last for first, last in ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))):
+        since = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
+        dates = [f"{kind} (from {pd.Timestamp(round(s), unit='s')})" for kind, s in since.items() if _YEARS_S[0] < s < _YEARS_S[1]]
+        kinds[f"days (time_format {', '.join(dates) or 'D'})"] = is_odd or is_date
     if kind := next((kind for kind, found in kinds.items() if found), None):
         raise InputError(
-            f"Expected times whose unit is known. Received: {values[0]:.17g} to {values[-1]:.17g} in {what}, which may be {kind} "
+            f"Expected times whose unit is known. Received: {values[0]:.15g} to {values[-1]:.15g} in {what}, which may be {kind} "
             "or seconds (time_format 's'). Give time_format (--time-format), or write the times as dates."
         )
 
 
 def _infer_unit(values: np.ndarray, what: str) -> str:
     size = float(np.median(np.abs(values))) if len(values) else 0.0
-    if len(values) > 1:
-        _refuse_two_meanings(values, what)
-    refuse_days(values, what)
+    refuse_two_meanings(values, what)
     unit = "s" if size < _YEARS_S[0] else epoch_unit(size)
     if unit is not None:
         return unit
@@ -350,31 +338,29 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
         return local
 
 
-def refuse_restart(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
-    """Refuses times that count from zero and begin again, as after a restart; the arguments are those of `refuse_repeated_local_hour`."""
-    steps = np.diff(times)
-    late = 10 * np.median(np.abs(steps)) if len(steps) else 0  # a single late row is followed by as long a step forward
-    back = (steps[:-1] < -late) & (np.abs(steps[1:]) <= late) & (times[1:-1] <= np.minimum.accumulate(times)[:-2] + late)
-    if back.any():
-        raise InputError(
-            f"Expected a clock that increases. Received: times that count from zero and begin again at {log.place(numbers[np.argmax(back) + 1])} of "
-            f"{name}, as after a restart. Read the parts one by one, or give time 'none' (--time none) to count the samples."
-        )
+def refuse_steps_back(times: np.ndarray, rows: np.ndarray, log: CleaningLog, name: str, has_zone: bool) -> None:
+    """Refuses times that step back where sorting would mix what happened at different times.
 
-
-def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
-    """Refuses times that step back by about one hour only, as a local clock does: without its zone, sorting would mix the two hours.
-
-    So are times that step back by a day to where there were none, as where the date of the first day stays past midnight.
-    `times` are nanoseconds in the order of the source, and `numbers` their rows there.
+    These are times that count from zero and begin again, as after a restart, and dates that step back by a day to where there were none, as
+    where the date of the first day stays past midnight; without a zone, also dates that step back by about one hour only, as a local clock
+    does. `times` are nanoseconds in the order of the source, and `rows` their rows there.
     """
     steps, hour = np.diff(times), UNITS_NS["h"]
     usual = np.median(np.abs(steps)) if len(steps) else 0
     back = np.flatnonzero(steps < 0)
-    is_hour, is_day = (np.abs(steps[back] + span) <= 2 * usual for span in (hour, UNITS_NS["D"]))
-    if len(back) and usual < hour / 2 and (is_hour.all() or is_day.all() and len(np.unique(times)) == len(times)):
-        step = "one hour, as local clocks do," if is_hour.all() else "one day, as where a date stays past midnight,"
-        raise InputError(
-            f"Expected ascending times, or their time zone. Received: times without a zone that step back by {step} at "
-            f"{log.place(numbers[back[0] + 1])} of {name}. Correct them, or give timezone (--timezone Europe/Berlin, or UTC to take them as is)."
+    if log.counts:  # a single late row is followed by as long a step forward
+        late = 10 * usual
+        back = np.flatnonzero(
+            (steps[:-1] < -late) & (np.abs(steps[1:]) <= late) & (times[1:-1] <= np.minimum.accumulate(times)[:-2] + late)
         )
+        how = "count from zero and begin again, as after a restart"
+        then = "Read the parts one by one, or give time 'none' (--time none) to count the samples"
+    elif not has_zone and usual < hour / 2 and (np.abs(steps[back] + hour) <= 2 * usual).all():
+        how = "state no zone and step back by one hour, as local clocks do"
+        then = "Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)"
+    elif usual < hour / 2 and (np.abs(steps[back] + UNITS_NS["D"]) <= 2 * usual).all() and len(np.unique(times)) == len(times):
+        how, then = "step back by one day, as where a date stays past midnight", "Correct the dates"
+    else:
+        return
+    if len(back):
+        raise InputError(f"Expected ascending times. Received: times that {how}, at {log.place(rows[back[0] + 1])} of {name}. {then}.")

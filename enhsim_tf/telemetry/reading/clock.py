@@ -13,7 +13,7 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import is_text
 from enhsim_tf.telemetry.cleaning.options import UNITS_NS
-from enhsim_tf.telemetry.cleaning.times import Times, epoch_unit, refuse_days
+from enhsim_tf.telemetry.cleaning.times import Times, epoch_unit, refuse_two_meanings
 
 NO_TIME = "none"  # instead of the name of a time column: the table has no times, and samples are counted
 _TIMES = set(
@@ -189,7 +189,7 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
     form = _name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
     if form is None and pd.api.types.is_numeric_dtype(clock.cells.dtype) and re.search(r"dat(?:e|um)", name.casefold()):
         values = clock.cells.to_numpy(np.float64, na_value=np.nan)
-        refuse_days(values[np.isfinite(values)], f"{name!r} of {what}", even_whole=True)
+        refuse_two_meanings(values[np.isfinite(values)], f"{name!r} of {what}", is_date=True)
     return form
 
 

@@ -19,11 +19,9 @@ _FLAGS = set("quality qc qa flag flags valid validity mask".split())
 _ROWS = set("index idx row rows rownumber record recordnumber id no nr sample samples number entry scan seq counter".split())
 _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
-_OWN = {  # what the commands write beside the values: the columns that give it away, all columns, and the label among them
-    "labelled series": (("severity", "onset", "end", "mask"), ("scenario", "severity", "onset", "end", "mask"), "mask"),
-    "scores": (("value", "score", "flag"), ("enhanced", "score", "score_after", "flag", "out_of_range"), None),
-    "copies of a run": (("copy", "value", "out_of_range"), ("scenario", "severity", "onset", "end", "mask", "out_of_range"), None),
-}
+_LABELLED = {"severity", "onset", "end", "mask"}
+_WRITTEN = (_LABELLED, {"value", "score", "flag"}, {"copy", "value", "out_of_range"})  # columns that give away a file of the commands
+_OWN = _LABELLED.union("scenario enhanced score score_after flag out_of_range".split())  # what these have beside the values
 _MAX_STATES = 10  # a label or flag has at most this many different values
 _OBJECTS = {"dates": datetime.date | np.datetime64, "times of day": datetime.time, "spans": datetime.timedelta}
 _TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
@@ -58,7 +56,7 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
 
     take("labels", _labels_of(frame, kinds, asked, options))
     take("series", options.series_column or ())
-    take("own columns", _own_columns(frame))
+    take("own columns", _OWN.intersection(frame.columns) if any(marks <= set(frame.columns) for marks in _WRITTEN) else ())
     take("quality flags", [name for name, kind in kinds.items() if _words_of(name) & _FLAGS and _has_states(frame[name], kind)])
     is_influx = {"result", "table", "_time"} <= set(kinds)
     take("row numbers", [name for name in numbers if _numbers_rows(name, numbers[name]) or is_influx and name == "table"])
@@ -151,18 +149,12 @@ def _labels_of(frame: pd.DataFrame, kinds: Mapping[str, str], asked: set[str], o
     """Returns the columns that label anomalous rows: those that the options name, or those whose name and values show it."""
     if options.label_column is not None:
         return [] if options.label_column == (NO_TIME,) else list(options.label_column)
-    own = [label for marks, _, label in _OWN.values() if label is not None and set(marks) <= set(frame.columns) and label not in asked]
     found = [
         name
         for name, kind in kinds.items()
         if name not in asked and _words_of(name) & _LABELS and kind in ("numbers", "words") and _has_states(frame[name], kind)
     ]
-    return [*found, *(label for label in own if label not in found)]
-
-
-def _own_columns(frame: pd.DataFrame) -> set[str]:
-    names = set(frame.columns)
-    return {column for marks, columns, _ in _OWN.values() if set(marks) <= names for column in columns}
+    return [*found, "mask"] if _LABELLED <= {*frame.columns} - asked else found
 
 
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
