@@ -23,7 +23,6 @@ from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 from enhsim_tf.telemetry.sources import Source, read_source
 from enhsim_tf.telemetry.windows import runs_of
 
-_QUIET = ("constant", "stuck", "quantised", "changing level")
 _NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns", "columns left out")  # kinds of such columns
 _FEW_ODD = 0.002  # share of steps that are no whole number of intervals, above which a run is interpolated
 
@@ -62,8 +61,7 @@ def read_recording(
     first = cleaned[names[0]].report
     own_s, has_time, notes = first.interval_s, cleaned[names[0]].longest.has_time, []
     for each, found in cleaned.items():
-        kept = (finding for finding in found.report.findings if finding.kind not in _QUIET and finding.action != "accepted")
-        notes += [f"{name}, {each}: {finding.text}" for finding in kept]
+        notes += [f"{name}, {each}: {finding.text}" for finding in found.report.findings if finding.action != "accepted"]
     notes += [f"{name}: {finding.text}" for finding in first.findings if finding.kind in _NO_INPUTS]
     notes += [f"{name}: {stepped}"] if stepped else []
     grid_s = own_s if interval_s is None else float(interval_s)
@@ -93,8 +91,7 @@ def read_recording(
         carried = {each: table[each].iloc[rows].reset_index(drop=True) for each in others}
         parts.append(Run(values[begin:end], grid_s * begin + offset_s, carried))
     if start is not None:
-        clock = first.find("clock")
-        if clock is None or not clock.details.get("counts"):
+        if not cleaned[names[0]].longest.counts:
             raise InputError(
                 f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
             )
@@ -105,15 +102,14 @@ def read_recording(
 def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning) -> tuple[dict[str, pd.Series], str]:
     """Interpolates a run whose solver chose its steps, or wrote events between its steps, and says so; other runs stay as they are."""
     first = next(iter(raw.values()))
-    if isinstance(first.index, pd.RangeIndex) or cleaning.interval_s is not None or not isinstance(first.index, pd.DatetimeIndex):
+    if cleaning.interval_s is not None or not isinstance(first.index, pd.DatetimeIndex):
         return dict(raw), ""
     times = np.unique(first.index.dropna().as_unit("ns").asi8)
-    if len(times) < 3:
-        return dict(raw), ""
-    steps, interval = np.diff(times), find_interval(times)
-    regular = regular_step_fraction(times, interval)
+    interval = find_interval(times) if len(times) > 2 else 1.0
+    regular = regular_step_fraction(times, interval) if len(times) > 2 else 1.0
     if regular > 1 - _FEW_ODD:
         return dict(raw), ""
+    steps = np.diff(times)
     if interval_s is not None:
         interval = interval_s * 1e9
     elif regular < 0.5:
@@ -163,11 +159,8 @@ def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, 
         return np.clip(places + base // 10**9 - raw.index.start, 0, len(raw) - 1)
     stamps = pd.DatetimeIndex(raw.index)
     if stamps.tz is None:
-        stamps = localize_times(stamps, cleaning.timezone) if cleaning.timezone else stamps.tz_localize("UTC")
+        stamps = localize_times(stamps, cleaning.timezone or "UTC")
     rows = np.flatnonzero(stamps.notna())
-    times = stamps[rows].as_unit("ns").asi8
-    order = np.argsort(times, kind="stable")
-    rows, times = rows[order], times[order]
-    wanted = base + np.round(places * grid_s * 1e9).astype(np.int64)
-    after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)  # a run has at least two samples
-    return rows[np.where(wanted - times[after - 1] <= times[after] - wanted, after - 1, after)]
+    known = pd.DataFrame({"time": stamps[rows].as_unit("ns").asi8, "row": rows}).sort_values("time", kind="stable")
+    wanted = pd.DataFrame({"time": base + np.round(places * grid_s * 1e9).astype(np.int64)})
+    return pd.merge_asof(wanted, known, on="time", direction="nearest")["row"].to_numpy()
