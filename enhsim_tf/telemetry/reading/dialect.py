@@ -30,33 +30,28 @@ class Dialect:
     units: Sequence[str] = ()  # cells of the line between the names and the data, where units stand
 
 
-def decode(content: bytes) -> tuple[str, str, list[Finding]]:
-    """Decodes the content of a text file; raises a `ValueError` if it is not text.
-
-    Returns:
-        The text (its first part if all of it is ASCII with lines), the encoding, and findings for the cleaning log.
-    """
+def decode(content: bytes) -> tuple[str, list[Finding]]:
+    """Decodes the content of a text file, and returns findings for the cleaning log; raises a `ValueError` if it is not text."""
     findings = []
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        text, encoding = content.decode("utf-16"), "utf-16"
+        text = content.decode("utf-16")
     else:
         whole = content.rstrip(b"\x00")
         if len(whole) < len(content):
             text = f"NUL bytes at the end, as after a power failure: {len(content) - len(whole):,}"
             findings.append(Finding("padding", len(content) - len(whole), text))
         try:
-            is_simple = b"\x00" not in content and content.isascii() and b"\n" in content
-            text, encoding = whole[: _HEAD if is_simple else None].decode("utf-8-sig"), "utf-8"  # with or without a byte order mark
+            text = whole.decode("utf-8-sig")  # with or without a byte order mark
         except UnicodeDecodeError:
-            text, encoding = whole.decode("cp1252", "replace"), "cp1252"
+            text = whole.decode("cp1252", "replace")
             findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Windows-1252"))
     if "\x00" in text:
         raise ValueError("it is not text")
     if "\r" in text and "\n" not in text:
         text = text.replace("\r", "\n")
-    if not text[:10_000].strip() and not text.strip():
+    if not text or text.isspace():
         raise ValueError("it is empty")
-    return text, encoding, findings
+    return text, findings
 
 
 def find_dialect(text: str, name: str, no_header: bool, separator: str | None = None) -> Dialect:

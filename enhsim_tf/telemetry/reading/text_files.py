@@ -44,14 +44,14 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
         InputError: If it has no header, or its decimal sign cannot be told.
         ValueError: If it cannot be read. The message says why.
     """
-    text, encoding, findings = decode(content)  # of ASCII, the first part only
+    text, findings = decode(content)
     if _ANNOTATION.search(text[:10_000]):
-        return _read_annotated(content.decode("utf-8-sig" if encoding == "utf-8" else encoding), name, findings)
+        return _read_annotated(text, name, findings)
     dialect = find_dialect(text, name, options.no_header)
     if dialect.skipped:
         findings.append(Finding("header lines", dialect.skipped, f"lines before the data that were skipped: {dialect.skipped:,}"))
-    stream = _stream_of(content, text, encoding, dialect.first_line)
-    frame, decimal = _read_rows(stream, dialect, name, options.decimal)
+    data = "".join(text.split("\n", dialect.first_line)[dialect.first_line :])
+    frame, decimal = _read_rows(data, dialect, name, options.decimal)
     if decimal == ",":
         findings.append(Finding("decimal comma", 1, "the decimal sign of the file is a comma; points separate thousands"))
     repeated = _repeated_headers(frame, dialect.names)
@@ -63,27 +63,16 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     return table_of(frame, dialect, name, decimal, findings)
 
 
-def _stream_of(content: bytes, text: str, encoding: str, first_line: int) -> io.BytesIO:
-    """Returns the data behind the header in UTF-8; content that is in UTF-8 is not copied."""
-    is_plain = encoding == "utf-8" and b"\n" in content and not content.endswith(b"\x00")
-    whole, place = content if is_plain else text.encode(), 0
-    for _ in range(first_line):
-        place = whole.find(b"\n", place) + 1 or len(whole)
-    stream = io.BytesIO(whole)
-    stream.seek(place)
-    return stream
-
-
-def _read_rows(stream: io.BytesIO, dialect: Dialect, name: str, decimal: str | None) -> tuple[pd.DataFrame, str | None]:
+def _read_rows(data: str, dialect: Dialect, name: str, decimal: str | None) -> tuple[pd.DataFrame, str | None]:
     """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
     names = dialect.names
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
     sign = decimal or ("," if any(_shows_comma(head[column]) for column in head) else None)
     if sign is None and dialect.separator == ";":
         sign = _sign_of_country(head, names, name)
-    frame = _parse(stream, dialect, name, sign)
+    frame = _parse(data, dialect, name, sign)
     if sign is None and any(is_text(frame[column]) and _shows_comma(frame[column]) for column in frame):
-        sign, frame = ",", _parse(stream, dialect, name, ",")
+        sign, frame = ",", _parse(data, dialect, name, ",")
     return frame, sign
 
 
@@ -105,19 +94,14 @@ def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str
     return "," if not pointed and any(has_commas(cells) for cells in columns) else None
 
 
-def _parse(stream: io.BytesIO, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
-    width, begin = len(dialect.names), stream.tell()
+def _parse(data: str, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
+    width, is_blanks = len(dialect.names), dialect.separator == BLANKS
     options = {"sep": dialect.separator, "header": None, "names": range(width), "index_col": False, "low_memory": False}
-    options |= {"skip_blank_lines": dialect.separator == BLANKS, "decimal": decimal or ".", "skipinitialspace": dialect.separator != "\t"}
+    options |= {"skip_blank_lines": is_blanks, "decimal": decimal or ".", "skipinitialspace": dialect.separator != "\t"}
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # otherwise lines longer than the header are cut
         try:
-            frame = pd.read_csv(stream, **options)
-            if dialect.separator == BLANKS and frame.iloc[:-1, -1].isna().any():  # the last line may be cut
-                for number, line in enumerate(stream.getvalue()[begin:].rstrip().split(b"\n")[:-1], dialect.first_line + 1):
-                    if 0 < len(line.split()) < width:
-                        raise ValueError(f"line {number} has {len(line.split())} cells, the header {width}")
-            return frame
+            frame = pd.read_csv(io.BytesIO(data.encode()), **options)
         except pd.errors.EmptyDataError:
             return pd.DataFrame(columns=range(width), dtype=object)
         except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
@@ -127,9 +111,11 @@ def _parse(stream: io.BytesIO, dialect: Dialect, name: str, decimal: str | None)
                 raise ValueError(f"line {int(line) + dialect.first_line} has {cells} cells, the header {width}") from None
             is_quote = "EOF" in str(error) or "quot" in str(error)
             raise ValueError("a quote that does not end" if is_quote else "lines that do not match the header") from None
-        finally:
-            if not stream.closed:
-                stream.seek(begin)  # it may be read again with another decimal sign
+    if is_blanks and frame.iloc[:-1, -1].isna().any():  # the last line may be cut
+        for number, line in enumerate(data.rstrip().split("\n")[:-1], dialect.first_line + 1):
+            if 0 < len(line.split()) < width:
+                raise ValueError(f"line {number} has {len(line.split())} cells, the header {width}")
+    return frame
 
 
 def _repeated_headers(frame: pd.DataFrame, names: Sequence[str]) -> list[int]:
