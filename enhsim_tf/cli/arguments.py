@@ -225,7 +225,6 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     table = parser.add_argument_group("tables in other forms", "what is detected unless it is given (docs/own_data.md)")
     _add_repeated(table, "--label-column", "column that labels anomalous rows, or 'none'")
     _add_repeated(table, "--series-column", "column whose values tell several series apart, or 'none'")
-    _add_repeated(table, "--value-column", "column that holds the values of such series")
     table.add_argument("--no-header", action="store_true", help="the file has no line of names: columns are 'column 0', 'column 1', ...")
     table.add_argument("--decimal", choices=(".", ","), help="decimal sign; the other one separates thousands")
     _add_cleaning(parser)

@@ -118,7 +118,7 @@ def _refuse(options: argparse.Namespace, when: str, *names: str) -> None:
 
 def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:
     """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
-    same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill drop_bad".split()
+    same = "label_column series_column no_header decimal time_format timezone max_fill fill drop_bad".split()
     return Cleaning(
         **{name: getattr(options, name) for name in same if hasattr(options, name)},
         interval_s=getattr(options, "interval", None),

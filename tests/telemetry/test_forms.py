@@ -133,6 +133,10 @@ READ = {
     "no end of the last line": (table("time,v", UTC, VALUES).rstrip("\n"), START),
     "the time last, and words": (table("v,state,when", VALUES, ["on"] * N, UTC), START),
     "files joined with their headers": (table("time,v", UTC, VALUES).replace("\n2024-03-01T00:30", "\ntime,v\n2024-03-01T00:30"), START),
+    "a stop of WinCC": (
+        table("VarName;TimeString;VarValue", ["T"] * N, UTC, VALUES, separator=";", below="$RT_OFF$;2024-03-01T01:00:00Z;0\n"),
+        START,
+    ),
     "units behind all numbers": (table("time,v", UTC, [f"{value} °C" for value in VALUES]), START),
     "NaN of C": (table("time,v", UTC, VALUES).replace(f",{VALUES[30]}\n", ",-nan(ind)\n"), START),
 }
@@ -205,7 +209,7 @@ REFUSED = {
     "a zone in letters": (table("time,v", stamps("%Y-%m-%d %H:%M CET"), VALUES), "offset such as +01:00"),
     "a point where there are commas": (table("Zeit;U", stamps("%d.%m.%Y %H:%M"), ["1.234"] * N, separator=";"), "'1.234'"),
     "no names": (table("0.0,20.0", SECONDS[1:] + 0.5, VALUES[1:]), "--no-header"),
-    "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), "all their digits"),
+    "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), "if the clock lost digits"),
     "minutes where there are seconds": (table("time,v", ["2024-03-01 00:00", "2024-03-01 00:01"] * 30, VALUES), "2 different"),
     "thousands or decimals": (table("time;v", MINUTES, ["1,500"] * N, separator=";"), "--decimal"),
     "points and commas": (
@@ -340,9 +344,9 @@ def test_a_blank_line_at_the_end_of_several_series_is_none_of_them(tmp_path):
 
 
 def test_the_columns_of_series_and_values_can_be_named():
-    frame, options = long(number=(7, 8)).assign(other=1.0), Cleaning(series_column="number", value_column="v")
-    channels = read_source(frame, options=options)
-    assert list(channels) == ["7", "8"] and list(read_source(frame, ["8"], options=options)) == ["8"]
+    frame, options = long(number=(7, 8)).assign(other=1.0), Cleaning(series_column="number")
+    channels = read_source(frame, ["v"], options=options)
+    assert list(channels) == ["7", "8"] and list(read_source(frame, ["8.v"], options=options)) == ["8.v"]
     check(channels["8"], VALUES + 9)
 
 

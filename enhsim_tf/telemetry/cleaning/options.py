@@ -15,7 +15,7 @@ UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10*
 DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_529.0}
 """Kinds of days and their number of 1970-01-01: spreadsheets, modified Julian dates, Julian dates, MATLAB."""
 _MAX_FILL = {"linear": 5, "hold": 1_000_000}
-_NAMES = ("label_column", "series_column", "value_column")
+_NAMES = ("label_column", "series_column")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,7 +42,6 @@ class Cleaning:
         label_column: Name, or names, of the columns of a table that label anomalous rows, or "none". None: detected.
         labelled: Treatment of rows that are labelled anomalous: "keep" them, or take their values as "missing".
         series_column: Name, or names, of the columns whose values tell several series of one table apart, or "none". None: detected.
-        value_column: Name, or names, of the columns that hold the values of such series. None: all columns of numbers.
         no_header: Whether a text file has no line of column names. Its columns are then called "column 0", "column 1", ...
 
     Raises:
@@ -62,7 +61,6 @@ class Cleaning:
     label_column: str | Sequence[str] | None = None
     labelled: str = "keep"
     series_column: str | Sequence[str] | None = None
-    value_column: str | Sequence[str] | None = None
     no_header: bool = False
 
     def __post_init__(self):
@@ -93,5 +91,5 @@ class Cleaning:
 
     def of_run(self, **changes: object) -> "Cleaning":
         """Returns the options for a recorded run of a simulator, which has another layout, with further changes of fields."""
-        own = {"time_format": None, "label_column": None, "labelled": "keep", "series_column": None, "value_column": None}
+        own = {"time_format": None, "label_column": None, "labelled": "keep", "series_column": None}
         return dataclasses.replace(self, **own | {"no_header": False} | changes)

@@ -121,8 +121,6 @@ class _Reader:
             whole = np.floor(values[usable])
             since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
         is_epoch = bool(usable.any()) and bool(form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9)
-        if is_epoch:
-            _refuse_lost_digits(values[usable], self.what)
         form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
         stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
         return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
@@ -180,16 +178,6 @@ class _Reader:
         name = "ISO 8601 dates" if form == _ISO else f"dates of the form {form}"
         stamps = parsed.stamps.tz_localize("UTC") if is_zoned else parsed.stamps
         return Times(stamps, bad | parsed.bad, name, "stated, converted to UTC" if is_zoned else "")
-
-
-def _refuse_lost_digits(values: np.ndarray, what: str) -> None:
-    """Refuses times since 1970 that a spreadsheet wrote as 1.70925E+12, so that most rows share their time with others."""
-    unit = 10.0 ** (np.floor(np.log10(max(np.abs(values).max(), 1))) - 6)
-    if len(values) >= 10 and (values[:1_000] % unit == 0).all() and len(np.unique(values)) < len(values) / 2 and (values % unit == 0).all():
-        raise InputError(
-            f"Expected times with all their digits. Received: {len(values):,} rows with {len(np.unique(values)):,} different times, the first "
-            f"{values[0]:g}, in {what}, as a spreadsheet shortens numbers. Export the column as text or as a date."
-        )
 
 
 def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) -> None:

@@ -76,8 +76,7 @@ def read_table_channels(
         _refuse_parallel_files(table.places, layout, what)
         chosen = {name: (name, None) for name in layout.channels}
     else:
-        values = options.value_column or [name for name in layout.channels if name not in keys]
-        chosen = _name_series(table.frame, keys, list(values), what)
+        chosen = _name_series(table.frame, keys, [name for name in layout.channels if name not in keys], what)
         text = f"series told apart by {', '.join(keys)}: {len(chosen):,} ({', '.join(list(chosen)[:6])})"
         findings.append(Finding("series", len(chosen), text))
     if columns is not None and named is None:
@@ -123,7 +122,7 @@ def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | No
     names = table.frame.columns
     repeated = set(names[names.duplicated()])
     times = () if time is None else (time,)
-    named = [*(options.label_column or ()), *(options.series_column or ()), *(options.value_column or ()), *times]
+    named = [*(options.label_column or ()), *(options.series_column or ()), *times]
     for name in [*(columns or ()), *named]:
         if name in repeated or name in named and name not in names and name != NO_TIME:
             received = f"{name!r} more than once in {what}" if name in repeated else repr(name)

@@ -44,7 +44,7 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
 
     `columns` are those that were asked for as channels, and `time` is the name of the time column or `NO_TIME`.
     """
-    frame, asked = table.frame, {*(columns or ()), *(options.value_column or ())}
+    frame, asked = table.frame, set(columns or ())
     kinds = {name: _kind_of(frame[name]) for name in frame.columns}
     if "%" in (options.time_format or ""):
         kinds |= {name: "dates" for name in frame.columns if name not in asked and _fits(frame[name], str(options.time_format))}

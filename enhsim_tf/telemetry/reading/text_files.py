@@ -59,7 +59,11 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
         frame = frame.astype(object)
         frame.iloc[repeated] = None
         lines = ", ".join(str(row + dialect.first_line + 1) for row in repeated[:3])
-        findings.append(Finding("header lines", len(repeated), f"lines that repeat the header, left out: {len(repeated):,} (line {lines})"))
+        findings.append(
+            Finding(
+                "header lines", len(repeated), f"lines that repeat the header or mark a stop, left out: {len(repeated):,} (line {lines})"
+            )
+        )
     return table_of(frame, dialect, name, decimal, findings)
 
 
@@ -119,12 +123,14 @@ def _parse(data: str, dialect: Dialect, name: str, decimal: str | None) -> pd.Da
 
 
 def _repeated_headers(frame: pd.DataFrame, names: Sequence[str]) -> list[int]:
-    """Returns the numbers of the rows that repeat the names, as in files that were joined."""
+    """Returns the numbers of the rows that repeat the names, as in files that were joined, or that WinCC writes where it stops (`$RT_OFF$`)."""
     first = next((place for place, name in enumerate(names) if not name.startswith("column ")), None)
     if first is None or not is_text(frame.iloc[:, first]):
         return []
-    rows = np.flatnonzero((frame.iloc[:, first] == names[first]).fillna(False))
-    return [row for row in rows if all(str(cell).strip() in (name, "nan") for cell, name in zip(frame.iloc[row], names, strict=True))]
+    is_mark = frame.iloc[:, first].astype("str").str.startswith("$RT_").fillna(False)
+    rows = np.flatnonzero((frame.iloc[:, first] == names[first]).fillna(False) | is_mark)
+    repeats = (all(str(cell).strip() in (name, "nan") for cell, name in zip(frame.iloc[row], names, strict=True)) for row in rows)
+    return [row for row, repeated in zip(rows, repeats, strict=True) if repeated or is_mark.iloc[row]]
 
 
 def _read_annotated(text: str, name: str, findings: list[Finding]) -> Table:
