@@ -15,7 +15,7 @@ from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.options import UNITS_NS
 from enhsim_tf.telemetry.cleaning.options import Cleaning as Cleaning
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
-from enhsim_tf.telemetry.cleaning.regular_grid import Rows, regularise
+from enhsim_tf.telemetry.cleaning.regular_grid import regularise
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, finding_from_dict, iso_time
 from enhsim_tf.telemetry.cleaning.times import localize_times, parse_times, refuse_steps_back
 from enhsim_tf.telemetry.series import Telemetry
@@ -72,12 +72,11 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         log = CleaningLog(None, [no_clock, *map(finding_from_dict, about.get("findings", ()))], places)
         numbers = np.arange(len(values))
         begin = series.index.start if is_series and series.index.step == 1 else 0  # a slice of a longer series keeps its sample numbers
-        rows = Rows((numbers + begin) * UNITS_NS["s"], values, numbers)
+        rows = pd.DataFrame({"time": (numbers + begin) * UNITS_NS["s"], "value": values, "row": numbers})
     log.findings += noted
 
-    base = int(rows.times[0])
-    rows.times = rows.times - base
-    parts, used, interval = regularise(rows, bad, log, name, options)
+    base = int(rows["time"].iloc[0])
+    parts, used, interval = regularise(rows.assign(time=rows["time"] - base), bad, log, name, options)
     describe_values(parts, values[np.isfinite(values)], log)
 
     first = parts[0].begin if has_time else -base
@@ -87,7 +86,9 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     return Cleaned(telemetry, report)
 
 
-def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
+def _rows_with_times(
+    index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]
+) -> tuple[CleaningLog, pd.DataFrame]:
     """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
     places = about.get("places", ROWS)
     parsed = parse_times(index, f"the times of {name}", options.drop_bad, options.time_format, places)
@@ -125,4 +126,4 @@ def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cl
     span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s" if clock["counts"] else f"from {iso_time(first)} to {iso_time(last)}"
     text = f"the clock is {clock['column']}: {clock['form']}, zone {clock['zone']}, {span}"
     log.findings.insert(0, Finding("clock", 1, text, details=clock | {"first_ns": first, "last_ns": last}))
-    return log, Rows(times[kept], values[kept], kept)
+    return log, pd.DataFrame({"time": times[kept], "value": values[kept], "row": kept})

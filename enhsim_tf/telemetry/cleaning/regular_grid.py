@@ -4,7 +4,6 @@ Times are int64 nanoseconds. Each step drops or merges rows, or fills samples, a
 """
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -20,22 +19,6 @@ _MAX_JITTER = 0.25  # largest distance of a time from the regular grid, in inter
 _LEAST_REGULAR = 0.4  # share of the steps that are whole numbers of intervals; random times reach 0.25
 
 
-@dataclasses.dataclass
-class Rows:
-    """The rows that are still in use, in chronological order. All arrays have the shape `(rows,)`."""
-
-    times: np.ndarray  # int64 nanoseconds
-    values: np.ndarray  # float64; a missing value is NaN or infinite
-    source_row: np.ndarray  # number of the row in the source
-
-    def __len__(self) -> int:
-        return len(self.times)
-
-    def take(self, which: np.ndarray | slice) -> "Rows":
-        """Selects rows by index, mask or slice."""
-        return Rows(self.times[which], self.values[which], self.source_row[which])
-
-
 @dataclasses.dataclass(frozen=True)
 class Part:
     """Regular samples without a gap. Both arrays have the shape `(samples,)`."""
@@ -45,23 +28,22 @@ class Part:
     source_row: np.ndarray  # row of each sample in the source; of a filled one, the last row before it
 
 
-@dataclasses.dataclass(frozen=True)
-class _Segment:
-    """Rows that lie on one regular grid: their slice, the grid point of each in ascending order, the time of point 0, and their distances."""
+def regularise(rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> tuple[list[Part], int, float]:
+    """Turns rows into regular parts.
 
-    rows: slice
-    places: np.ndarray
-    begin: float
-    off: np.ndarray
-
-
-def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> tuple[list[Part], int, float]:
-    """Turns rows into regular parts; `bad` marks the source rows whose value cannot be read.
+    Args:
+        rows: The rows that have a time, in chronological order: `time` in nanoseconds, `value`, NaN or infinite where it is missing, and
+            `row`, their number in the source.
+        bad: Which rows of the source have a value that cannot be read.
+        log: Receives what is found.
+        name: Of the channel, for messages.
+        options: How problems are treated.
 
     Returns:
         The parts, the number of rows that their samples represent, and the interval in nanoseconds.
     """
     rows = _drop_duplicate_times(_drop_missing_values(rows, bad, log, name), log, name, options)
+    times = rows["time"].to_numpy()
     holds = options.fill == "hold"
     by_interval = options.interval_s is not None or holds
     if log.times is None:
@@ -73,22 +55,21 @@ def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options
             f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s (--interval)."
         )
     else:
-        interval = find_interval(rows.times)
-        if regular_step_fraction(rows.times, interval) < _LEAST_REGULAR:
+        interval = find_interval(times)
+        if regular_step_fraction(times, interval) < _LEAST_REGULAR:
             raise InputError(
-                f"Expected roughly regular times. Received: steps from {np.diff(rows.times).min() / 1e9:g} s to "
-                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. "
+                f"Expected roughly regular times. Received: steps from {np.diff(times).min() / 1e9:g} s to "
+                f"{np.diff(times).max() / 1e9:g} s without a common interval, in {name}. "
                 "Give interval_s (--interval), and fill='hold' (--fill hold) for telemetry that is sent only when it changes."
             )
-        other = np.flatnonzero(_have_other_rate(rows.times, interval))
+        other = np.flatnonzero(_have_other_rate(times, interval))
         if len(other) and not holds:  # a long step of telemetry that is held is no slower rate
             by_interval = True
             usual = f"one every {interval / 1e9:.6g} s, to which they are averaged or filled"
-            log.add("other rates", rows.source_row[other], f"rows in stretches of another rate than {usual}: {{count}}")
-    segments = _segments(rows.times, interval, options.longest_gap + 1, by_interval)
+            log.add("other rates", rows["row"].to_numpy()[other], f"rows in stretches of another rate than {usual}: {{count}}")
+    rows, begins = _on_grids(rows, interval, options.longest_gap + 1, by_interval)
     how = "last" if holds else "mean" if by_interval else options.same_time
-    parts, used = _build_parts(rows, segments, interval, log, name, how, options)
-    return parts, used, interval
+    return *_build_parts(rows, begins, interval, log, name, how, options), interval
 
 
 def find_interval(times: np.ndarray) -> float:
@@ -144,24 +125,27 @@ def _have_other_rate(times: np.ndarray, interval: float) -> np.ndarray:
     return marks
 
 
-def _drop_missing_values(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str) -> Rows:
+def _drop_missing_values(rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str) -> pd.DataFrame:
     """Drops rows without a finite value."""
-    has_value = np.isfinite(rows.values)
-    unread, missing = rows.source_row[~has_value & bad[rows.source_row]], rows.source_row[~has_value & ~bad[rows.source_row]]
-    log.add("bad values", unread, "values that cannot be read, taken as missing: {count}", rows_left_out=len(unread))
-    log.add("missing values", missing, "rows without a value (NaN, infinite or empty), taken as gaps: {count}", rows_left_out=len(missing))
+    has_value = np.isfinite(rows["value"])
+    missing = rows["row"][~has_value].to_numpy()
+    for kind, numbers, text in (
+        ("bad values", missing[bad[missing]], "values that cannot be read, taken as missing: {count}"),
+        ("missing values", missing[~bad[missing]], "rows without a value (NaN, infinite or empty), taken as gaps: {count}"),
+    ):
+        log.add(kind, numbers, text, rows_left_out=len(numbers))
     if not has_value.any():
         raise InputError(f"Expected values. Received: only missing ones in {name}. Choose another channel.")
-    return rows.take(has_value)
+    return rows[has_value]
 
 
-def _drop_duplicate_times(rows: Rows, log: CleaningLog, name: str, options: Cleaning) -> Rows:
+def _drop_duplicate_times(rows: pd.DataFrame, log: CleaningLog, name: str, options: Cleaning) -> pd.DataFrame:
     """Keeps one row for each time. A mean that would merge most rows must be asked for, by an interval."""
-    is_copy = pd.DataFrame({"time": rows.times, "value": rows.values}).duplicated().to_numpy()
-    copies = rows.source_row[is_copy]
+    is_copy = rows.duplicated(["time", "value"])
+    copies = rows["row"][is_copy].to_numpy()
     log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
-    rows = rows.take(~is_copy)
-    kept, left = _merge_groups(rows, rows.times, options.same_time)
+    rows = rows[~is_copy]
+    kept, left = _merge_groups(rows, ["time"], options.same_time)
     if options.same_time == "mean" and options.interval_s is None and 2 * len(left) >= len(rows) > 2:
         raise InputError(
             f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
@@ -172,107 +156,99 @@ def _drop_duplicate_times(rows: Rows, log: CleaningLog, name: str, options: Clea
     return kept
 
 
-def _merge_groups(rows: Rows, groups: np.ndarray, how: str) -> tuple[Rows, np.ndarray]:
-    """Merges each group of neighbouring rows into one row; also returns the source rows that were merged into others."""
-    edges = np.flatnonzero(np.diff(groups)) + 1
-    first, last = np.append(0, edges), np.append(edges, len(rows)) - 1
-    kept = rows.take(last if how == "last" else first)
-    if how != "last":
-        kept.values = np.add.reduceat(rows.values, first) / (last - first + 1)
-    return kept, np.setdiff1d(rows.source_row, kept.source_row)
+def _merge_groups(rows: pd.DataFrame, by: list[str], how: str) -> tuple[pd.DataFrame, np.ndarray]:
+    """Merges rows that are equal in some columns into one row; also returns the source rows that were merged into others."""
+    is_left = rows.duplicated(by, keep="last" if how == "last" else "first")
+    kept = rows[~is_left]
+    if how == "mean" and is_left.any():
+        kept = kept.assign(value=rows.groupby(by)["value"].mean().to_numpy())
+    return kept, rows["row"][is_left].to_numpy()
 
 
-def _segments(times: np.ndarray, interval: float, max_step: int, by_interval: bool) -> list[_Segment]:
+def _on_grids(rows: pd.DataFrame, interval: float, max_step: int, by_interval: bool) -> tuple[pd.DataFrame, np.ndarray]:
     """Splits a series at gaps of more than `max_step` intervals and assigns every row to a point of a regular grid.
 
-    With `by_interval`, this is the nearest point of one grid that starts at the first row. Otherwise each segment has a grid of its own,
-    and the series is also split where its times leave that grid, as at a jump of the clock.
+    With `by_interval`, this is the nearest point of one grid that starts at the first row. Otherwise each part has a grid of its own, and
+    the series is also split where its times leave that grid, as at jumps of the clock.
+
+    Returns:
+        The rows with the number of their `part`, their `place` on its grid and their distance from that, `off`; the beginning of each part.
     """
-    if by_interval:
-        places = np.round((times - times[0]) / interval).astype(np.int64)
-    else:
-        places = np.append(0, np.cumsum(np.round(np.diff(times) / interval))).astype(np.int64)
-    breaks = np.append(np.diff(places) > max_step, True)
+    times = rows["time"].to_numpy()
+    steps = (times - times[0]) / interval if by_interval else np.append(0, np.cumsum(np.round(np.diff(times) / interval)))
+    places = np.round(steps).astype(np.int64)
+    begins = np.diff(places, prepend=places[0]) > max_step
     if not by_interval:
-        breaks[:-1] |= _leave_grid(times - places * interval, breaks, 2 * _MAX_JITTER * interval + 0.5)
-    segments, stops = [], np.flatnonzero(breaks) + 1
-    for start, stop in zip([0, *stops[:-1].tolist()], stops.tolist(), strict=True):
-        inside = places[start:stop] - places[start]
-        off = times[start:stop] - times[start] - inside * interval
-        middle = float(np.median(off)) if not by_interval else times[0] + places[start] * interval - times[start]
-        if not by_interval and np.abs(off - middle).max() > _MAX_JITTER * interval:
-            middle = float(off.max() + off.min()) / 2
-        segments.append(_Segment(slice(start, stop), inside, float(times[start]) + middle, off - middle))
-    return segments
+        _mark_spread(times - places * interval, begins, 2 * _MAX_JITTER * interval + 0.5)
+    part = np.cumsum(begins)
+    firsts = np.append(0, np.flatnonzero(begins))
+    place = places - places[firsts][part]
+    off = times - times[firsts][part] - place * interval
+    if by_interval:
+        middle = times[0] + places[firsts] * interval - times[firsts]
+    else:
+        low, middle, high = (pd.Series(off).groupby(part).agg(each).to_numpy() for each in ("min", "median", "max"))
+        middle = np.where(np.maximum(high - middle, middle - low) <= _MAX_JITTER * interval, middle, (low + high) / 2)
+    return rows.assign(part=part, place=place, off=off - middle[part]), times[firsts] + middle
 
 
-def _leave_grid(off: np.ndarray, breaks: np.ndarray, spread: float) -> np.ndarray:
-    """Marks the steps at which segments must end, so that the distances from the grid within each one differ by at most `spread`."""
-    marks = np.zeros(len(off) - 1, bool)
+def _mark_spread(off: np.ndarray, begins: np.ndarray, spread: float) -> None:
+    """Marks further beginnings of parts, so that the distances from the grid within each part differ by at most `spread`."""
     low = high = off[0]
-    for step, (value, is_break) in enumerate(zip(off[1:].tolist(), breaks[:-1].tolist(), strict=True)):
+    for row, value in enumerate(off.tolist()):
         low, high = min(low, value), max(high, value)
-        if is_break or high - low > spread:
-            marks[step], low, high = True, value, value
-    return marks
+        if begins[row] or high - low > spread:
+            begins[row], low, high = True, value, value
 
 
 def _build_parts(
-    rows: Rows, segments: Sequence[_Segment], interval: float, log: CleaningLog, name: str, how: str, options: Cleaning
+    rows: pd.DataFrame, begins: np.ndarray, interval: float, log: CleaningLog, name: str, how: str, options: Cleaning
 ) -> tuple[list[Part], int]:
     """Builds regular parts, fills their short gaps, and counts the rows that they use. Of several rows at one grid point, one is kept."""
-    parts, used, merged, short, gaps, num_filled = [], 0, [], [], [], 0
-    off, holds = np.zeros(len(rows)), options.fill == "hold"
-    for segment in segments:
-        inside, length = rows.take(segment.rows), int(segment.places[-1]) + 1
-        if length < options.min_part:
-            short.append(inside.source_row)
-            continue
-        off[segment.rows] = segment.off
-        inside, left = _merge_groups(inside, segment.places, how)
-        merged.append(left)
-        places, samples = np.unique(segment.places), np.arange(length)
-        previous = np.searchsorted(places, samples, "right") - 1
-        values = inside.values[previous] if holds else np.interp(samples, places, inside.values)
-        parts.append(Part(segment.begin, values, inside.source_row[previous]))
-        used += len(inside)
-        gaps.append(inside.source_row[:-1][np.diff(places) > 1])
-        num_filled += length - len(places)
-    if not parts:
-        longest = max(int(segment.places[-1]) + 1 for segment in segments)
+    lengths = rows.groupby("part")["place"].max().to_numpy() + 1
+    if (longest := lengths.max()) < options.min_part:
         raise InputError(
             f"Expected regular samples, at least {options.min_part} in a row. Received: {longest} at most, every {interval / 1e9:.6g} s, in {name}. "
             "Give interval_s (--interval), a longer max_fill (--max-fill), or a smaller min_part (of `fit`, --window)."
         )
-    _log_breaks(rows, segments, interval, log, options.longest_gap)
-    _log_jitter(rows, off, interval, log)
-    for kind, found, text in (
-        ("averaged", merged, f"rows that share an interval with another row, of which the {how} was taken: {{count}}"),
-        ("short parts", short, f"rows in parts of fewer than {options.min_part:,} samples ({len(short):,} such parts): {{count}}"),
-    ):
-        numbers = np.concatenate([*found, rows.source_row[:0]])
-        log.add(kind, numbers, text, rows_left_out=len(numbers))
+    _log_breaks(rows, interval, log, options.longest_gap)
+    is_short = lengths < options.min_part
+    short, rows = rows["row"][is_short[rows["part"]]].to_numpy(), rows[~is_short[rows["part"]]]
+    _log_jitter(rows, interval, log)
+    rows, merged = _merge_groups(rows, ["part", "place"], how)
+    text = f"rows that share an interval with another row, of which the {how} was taken: {{count}}"
+    log.add("averaged", merged, text, rows_left_out=len(merged))
+    text = f"rows in parts of fewer than {options.min_part:,} samples ({is_short.sum():,} such parts): {{count}}"
+    log.add("short parts", short, text, rows_left_out=len(short))
+    parts, holds = [], options.fill == "hold"
+    for number, inside in rows.groupby("part"):
+        places, values, samples = inside["place"].to_numpy(), inside["value"].to_numpy(), np.arange(lengths[number])
+        previous = np.searchsorted(places, samples, "right") - 1
+        filled = values[previous] if holds else np.interp(samples, places, values)
+        parts.append(Part(begins[number], filled, inside["row"].to_numpy()[previous]))
+    num_filled = int(lengths[~is_short].sum()) - len(rows)
+    is_gap = (np.diff(rows["part"]) == 0) & (np.diff(rows["place"]) > 1)
     filled = "filled with the value before them," if holds else "filled by straight lines with"
     text = f"gaps of up to {options.longest_gap} samples, {filled} {num_filled:,} samples in total: {{count}}"
-    log.add("gaps filled", np.concatenate(gaps), text, samples_filled=num_filled)
-    return parts, used
+    log.add("gaps filled", rows["row"].to_numpy()[:-1][is_gap], text, samples_filled=num_filled)
+    return parts, len(rows)
 
 
-def _log_breaks(rows: Rows, segments: Sequence[_Segment], interval: float, log: CleaningLog, max_fill: int) -> None:
-    before = np.array([segment.rows.stop - 1 for segment in segments[:-1]], np.int64)
-    steps = (rows.times[before + 1] - rows.times[before]) / interval
+def _log_breaks(rows: pd.DataFrame, interval: float, log: CleaningLog, max_fill: int) -> None:
+    before = np.flatnonzero(np.diff(rows["part"]))
+    steps, numbers = np.diff(rows["time"])[before] / interval, rows["row"].to_numpy()[before]
     is_gap = np.round(steps) > max_fill + 1
     unit = 1.0 if log.times is None else interval / 1e9
     longest, what = steps.max(initial=0) * unit, "samples" if log.times is None else "s"
     text = f"gaps of more than {max_fill} samples, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
-    log.add("gaps", rows.source_row[before[is_gap]], text, details={"longest": float(longest)})
-    log.add("clock steps", rows.source_row[before[~is_gap]], "jumps of the clock, at which the series is split: {count}")
+    log.add("gaps", numbers[is_gap], text, details={"longest": float(longest)})
+    log.add("clock steps", numbers[~is_gap], "jumps of the clock, at which the series is split: {count}")
 
 
-def _log_jitter(rows: Rows, off: np.ndarray, interval: float, log: CleaningLog) -> None:
-    share = np.abs(off) / interval
+def _log_jitter(rows: pd.DataFrame, interval: float, log: CleaningLog) -> None:
+    share = (rows["off"].abs() / interval).to_numpy()
     snapped = np.flatnonzero(share > 1e-3)  # smaller deviations come from rounded times
     largest = float(share.max()) * interval / 1e9
-    worst = rows.source_row[snapped[np.argsort(-share[snapped], kind="stable")]]
+    worst = rows["row"].to_numpy()[snapped[np.argsort(-share[snapped], kind="stable")]]
     text = f"times off the regular grid, by up to {largest:.4g} s ({share.max():.0%} of an interval), snapped to it: {{count}}"
     log.add("jitter", worst, text, details={"largest_s": largest})
