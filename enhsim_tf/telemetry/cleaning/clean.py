@@ -98,7 +98,7 @@ def _rows_with_times(
     local = stamps.tz is None
     if local and options.timezone:
         stamps = localize_times(stamps, options.timezone)
-    times = stamps.as_unit("ns").asi8 if stamps.tz is None else stamps.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8
+    times = stamps.as_unit("ns").asi8
     log = CleaningLog(times, map(finding_from_dict, about.get("findings", ())), places, clock["counts"])
     for kind, mask, text in (
         ("bad times", bad, "rows whose time cannot be read"),

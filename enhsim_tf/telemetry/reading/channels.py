@@ -1,6 +1,7 @@
 """Reads the channels of a table, each with its times and with findings that say what was decided."""
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -99,13 +100,12 @@ def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
     """Refuses files over the same times, which are no parts of one series."""
     if len({name for _, _, name in places}) < 2 or layout.times is None:
         return
-    stamps = np.split(layout.times.stamps.tz_localize(None), [row for row, _, _ in places[1:]])
-    spans = sorted(
-        (part.min(), part.max(), place[2]) for part, place in zip(map(pd.DatetimeIndex, stamps), places, strict=True) if part.notna().any()
-    )
-    for (begin, end, first), (other, last, second) in zip(spans, spans[1:], strict=False):
-        shorter = min(end - begin, last - other)
-        if min(end, last) - other > shorter / 2:
+    starts = [row for row, _, _ in places]
+    stamps = pd.Series(layout.times.stamps)
+    spans = stamps.groupby(np.searchsorted(starts, np.arange(len(stamps)), "right") - 1).agg(["min", "max"]).dropna()
+    for one, other in itertools.pairwise(spans.sort_values(["min", "max"]).itertuples()):
+        if min(one.max, other.max) - other.min > min(one.max - one.min, other.max - other.min) / 2:
+            first, second = places[one.Index][2], places[other.Index][2]
             raise InputError(
                 f"Expected files whose times follow each other. Received: {first} and {second} over the same times, in {what}. Give them one by one."
             )
@@ -182,7 +182,7 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
     candidates = [name for name in (*layout.words, *own) if 1 < frame[name].nunique(dropna=False) <= _MAX_SERIES]
     candidates.sort(key=lambda name: next((rank for rank, word in enumerate(_FIRST) if word == name.casefold()), len(_FIRST)))
     candidates.sort(key=lambda name: name in own)
-    times = None if layout.times is None else layout.times.stamps.tz_localize(None).as_unit("ns").asi8
+    times = None if layout.times is None else layout.times.stamps.as_unit("ns").asi8
     chosen: list[str] = []
     for name in candidates:
         if _is_key(frame, name, chosen, times, what if layout.channels else None):
@@ -194,14 +194,13 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
 
 def _is_key(frame: pd.DataFrame, name: str, chosen: Sequence[str], times: np.ndarray | None, what: str | None) -> bool:
     """Whether a column tells more series apart than the columns that were chosen before it; `what` describes the source if it may ask."""
-    before = _codes(frame, chosen)
     codes = _codes(frame, [*chosen, name])
-    if codes.max() == before.max():
+    if chosen and codes.max() == _codes(frame, chosen).max():
         return False
     if times is None:
         return _is_named(name) and np.bincount(codes).min() > 1
-    repeats = [_repeating(times, each) for each in (before, codes)]
-    if repeats[0] > _OFTEN and repeats[1] < repeats[0] / 2:
+    before, after = (_repeating(frame, keys, times) for keys in (chosen, [*chosen, name]))
+    if before > _OFTEN and after < before / 2:
         return True
     if chosen:
         return False
@@ -228,17 +227,13 @@ def _is_named(name: str) -> bool:
 
 def _codes(frame: pd.DataFrame, columns: Sequence[str]) -> np.ndarray:
     """Numbers the combinations of values of columns."""
-    if not columns:
-        return np.zeros(len(frame), np.int64)
     return frame.groupby(list(columns), sort=False, dropna=False).ngroup().to_numpy()
 
 
-def _repeating(times: np.ndarray, codes: np.ndarray) -> float:
+def _repeating(frame: pd.DataFrame, keys: Sequence[str], times: np.ndarray) -> float:
     """Share of the rows whose time occurred before in the same series."""
-    known = times != pd.NaT.value
-    if not codes.any() and (np.diff(times[known]) > 0).all():
-        return 0.0
-    return float(pd.DataFrame({"time": times[known], "code": codes[known]}).duplicated().mean()) if known.any() else 0.0
+    rows = frame[list(keys)].assign(**{"the time": times})[times != pd.NaT.value]
+    return float(rows.duplicated().mean()) if len(rows) else 0.0
 
 
 def _overlap(times: np.ndarray, codes: np.ndarray) -> bool:

@@ -213,7 +213,7 @@ def further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.n
     if times is None:
         parts = _date_parts(pd.DataFrame(numbers), numbers) or Clock()
         return found.union(parts.columns, (name for name, values in numbers.items() if _may_be_clock(_name_tells(name)[0], values)))
-    own = np.where(times.stamps.isna(), np.nan, times.stamps.tz_localize(None).as_unit("ns").asi8.astype(np.float64))
+    own = np.where(times.stamps.isna(), np.nan, times.stamps.as_unit("ns").asi8.astype(np.float64))
     for name, values in numbers.items():
         words = re.findall(r"[^\W\d_]+", name.casefold())
         is_named = _name_tells(name)[0] > 0 or bool(words) and all(word in _UNIT_OF or word in _BESIDE for word in words)
