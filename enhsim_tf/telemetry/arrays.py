@@ -4,6 +4,7 @@ In telemanom's SMAP and MSL data, column 0 of an array is the value, and each of
 one command was sent and 0 at all others.
 """
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None)
         found[name] = pd.Series(array[:, known[column]], name=name)
         if has_commands and columns is None:
             text = f"columns 1 to {last} hold only 0 and 1 and were taken as commands, not as channels: {last}"
-            found[name].attrs["findings"] = [Finding("commands", last, text).to_dict()]
+            found[name].attrs["findings"] = [dataclasses.asdict(Finding("commands", last, text))]
     return Channels(found, commands=array[:, 1:].astype(np.float32) if has_commands else None)
 
 

@@ -14,7 +14,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.regular_grid import find_interval
-from enhsim_tf.telemetry.cleaning.report import KINDS, finding_from_dict, lines_of
+from enhsim_tf.telemetry.cleaning.report import KINDS, lines_of
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
 settings.load_profile("repeatable")
@@ -36,7 +36,6 @@ def check_balance(cleaned):
     assert all(finding.count > 0 and len(finding.line().splitlines()) == 1 for finding in report.findings)
     assert all(finding.action == "left out" for finding in report.findings if finding.rows_left_out)
     assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["rows_in"] == report.rows_in
-    assert [finding_from_dict(content) for content in report.to_dict()["findings"]] == list(report.findings)
     ends = -np.inf
     for part in cleaned.parts:
         assert part.values.dtype == np.float32 and np.isfinite(part.values).all()
@@ -97,7 +96,7 @@ REPAIRED = {
     "local times with a zone": (CLEAN.tz_convert("Asia/Kolkata").tz_localize(None), {"timezone": "Asia/Kolkata"}, {}),
     "shuffled": (CLEAN.iloc[SHUFFLED], {}, {"unsorted": np.sum(SHUFFLED < np.maximum.accumulate(SHUFFLED))}),
     "two rows exchanged": (CLEAN.iloc[[0, 2, 1, *range(3, N)]], {}, {"unsorted": 1}),
-    "from the last to the first": (CLEAN.iloc[::-1], {}, {"descending": N}),
+    "from the last to the first": (CLEAN.iloc[::-1], {}, {"unsorted": N - 1}),
     "rows twice": (pd.concat([CLEAN, CLEAN.iloc[3:8]]).sort_index(), {}, {"duplicate rows": 5}),
     "jitter": (with_times(TIMES + JITTER), {}, {"jitter": np.sum(np.abs(JITTER.total_seconds()) > 1e-3)}),
     "ISO text": (with_times(TIMES.astype(str)), {}, {}),

@@ -16,7 +16,7 @@ from enhsim_tf.telemetry.cleaning.options import UNITS_NS
 from enhsim_tf.telemetry.cleaning.options import Cleaning as Cleaning
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
 from enhsim_tf.telemetry.cleaning.regular_grid import regularise
-from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, finding_from_dict, iso_time
+from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, iso_time
 from enhsim_tf.telemetry.cleaning.times import localize_times, parse_times, refuse_steps_back
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -68,8 +68,8 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     elif options.interval_s is not None:
         raise InputError(f"Expected times with interval_s (--interval). Received: {name} without any. Give a time column, or leave it out.")
     else:
-        no_clock = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
-        log = CleaningLog(None, [no_clock, *map(finding_from_dict, about.get("findings", ()))], places)
+        log = CleaningLog(None, about.get("findings", ()), places)
+        log.findings.insert(0, Finding("clock", 1, "no clock: samples are counted", details={"column": None}))
         numbers = np.arange(len(values))
         begin = series.index.start if is_series and series.index.step == 1 else 0  # a slice of a longer series keeps its sample numbers
         rows = pd.DataFrame({"time": (numbers + begin) * UNITS_NS["s"], "value": values, "row": numbers})
@@ -99,7 +99,7 @@ def _rows_with_times(
     if local and options.timezone:
         stamps = localize_times(stamps, options.timezone)
     times = stamps.as_unit("ns").asi8
-    log = CleaningLog(times, map(finding_from_dict, about.get("findings", ())), places, clock["counts"])
+    log = CleaningLog(times, about.get("findings", ()), places, clock["counts"])
     for kind, mask, text in (
         ("bad times", bad, "rows whose time cannot be read"),
         ("missing times", ~had_time & ~bad, "rows without a time"),
@@ -115,12 +115,8 @@ def _rows_with_times(
         clock = clock | {"zone": f"{options.timezone or 'UTC'}, as none is stated"}
     elif options.timezone and clock["zone"] != "none":
         clock = clock | {"zone": f"{clock['zone']}, which goes before {options.timezone}"}
-    steps = np.diff(times[kept])
-    if len(steps) and (steps <= 0).all() and (steps < 0).any():
-        log.add("descending", (), "rows in descending order of time, reversed: {count}", count=len(kept))
-    else:
-        early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
-        log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
+    early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
+    log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     kept = kept[np.argsort(times[kept], kind="stable")]
     first, last = int(times[kept[0]]), int(times[kept[-1]])
     span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s" if clock["counts"] else f"from {iso_time(first)} to {iso_time(last)}"

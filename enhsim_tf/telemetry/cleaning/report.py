@@ -15,7 +15,7 @@ from enhsim_tf.common.errors import printable, spoken
 _ACTIONS = {
     "accepted": "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, own columns, series, "
     "columns left out, commands, decimal comma, units, fill values, missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level",
-    "repaired": "descending, unsorted, other rates, jitter, gaps filled",
+    "repaired": "unsorted, other rates, jitter, gaps filled",
     "left out": "padding, missing times, bad times, clock change, duplicate rows, same time, missing values, bad values, averaged, short parts",
 }
 KINDS = {kind: action for action, kinds in _ACTIONS.items() for kind in kinds.split(", ")}
@@ -78,13 +78,8 @@ class Finding:
         return f"{self.action}: {self.text}{where}"
 
     def to_dict(self) -> dict[str, Any]:
-        """The finding in plain JSON types; `finding_from_dict` restores it."""
-        return dataclasses.asdict(self) | {"places": list(self.places), "action": self.action}
-
-
-def finding_from_dict(content: Mapping[str, Any]) -> Finding:
-    """Restores a finding from the output of `Finding.to_dict`."""
-    return Finding(**{name: tuple(value) if name == "places" else value for name, value in content.items() if name != "action"})
+        """The finding in plain JSON types."""
+        return dataclasses.asdict(self) | {"action": self.action}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,11 +140,13 @@ def lines_of(reports: Sequence[Report]) -> list[str]:
 class CleaningLog:
     """The log of cleaning actions: collects findings with their places in the source.
 
-    `times` are those of all rows in the order of the source, int64 nanoseconds since 1970, or None; `counts` as in `times.Times`.
+    `times` are those of all rows in the order of the source, int64 nanoseconds since 1970, or None; `findings` are the fields of those made
+    while reading; `counts` as in `times.Times`.
     """
 
-    def __init__(self, times: np.ndarray | None, findings: Sequence[Finding] = (), places: Places = ROWS, counts: bool = False):
-        self.times, self.findings, self.places, self.counts = times, list(findings), places, counts
+    def __init__(self, times: np.ndarray | None, findings: Sequence[Mapping[str, Any]] = (), places: Places = ROWS, counts: bool = False):
+        self.times, self.places, self.counts = times, places, counts
+        self.findings = [Finding(**each) for each in findings]
 
     def place(self, row: int) -> str:
         """Describes a row of the source by its place and its time."""

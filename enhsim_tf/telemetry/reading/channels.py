@@ -164,7 +164,7 @@ def _channel(
         findings.append(Finding("labels", max(1, int(mask.sum())), text))
         if options.labelled == "missing":
             series = series.mask(mask) if not is_text(series) else series.astype(object).mask(mask)
-    series.attrs = attrs | {"findings": [finding.to_dict() for finding in findings]}
+    series.attrs = attrs | {"findings": [dataclasses.asdict(finding) for finding in findings]}
     return series
 
 
