@@ -49,7 +49,7 @@ def read_source(source: Source, columns: Sequence[str] | None = None, time: str 
         return read_table_channels(source, columns, time, options)
     if not isinstance(source, str | os.PathLike):
         paths = [Path(os.fspath(each)) for each in source]
-        wrong = next((path for path in paths if path.suffix.lower() not in TABLES or not os.path.exists(path)), None)
+        wrong = next((path for path in paths if path.suffix.lower() not in TABLES or not _exists(path)), None)
         if wrong is not None or not paths:
             raise InputError(f"Expected tables that exist, as several sources are files of one table. Received: {wrong}. Give one source.")
         return read_table_channels(paths if len(paths) > 1 else paths[0], columns, time, options)
@@ -57,13 +57,20 @@ def read_source(source: Source, columns: Sequence[str] | None = None, time: str 
     if source.startswith("influxdb://"):
         return _read_influx(source, columns, time)
     path = Path(source)
-    if not os.path.exists(path):
+    if not _exists(path):
         raise InputError(f"Expected a source of telemetry. Received: {source}, which does not exist. Give {SOURCES}.")
     if path.is_dir() or path.suffix.lower() in TABLES:
         return read_table_channels(path, columns, time, options)
     if path.suffix.lower() == ".npy":
         return read_array_channels(path, columns, time)
     raise InputError(f"Expected a source of telemetry. Received: {path.name}. Give {SOURCES}.")
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that the file system does not allow
+        return False
 
 
 def _read_influx(source: str, columns: list[str] | None, time: str | None) -> Channels:
