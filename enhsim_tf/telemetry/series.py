@@ -110,8 +110,6 @@ def check_values(values: np.ndarray, what: str) -> np.ndarray:
     given = values = np.asarray(values)
     if values.ndim != 1:
         raise InputError(f"Expected one series of shape (samples,). Received: shape {values.shape} from {what}. Name a --column.")
-    if len(values) == 0:
-        raise InputError(f"Expected samples. Received: none from {what}. Give a file that holds a series.")
     if values.dtype.kind not in "fiu":
         raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Name a numeric --column.")
     with np.errstate(over="ignore"):  # values beyond float32 become infinite and are rejected below

@@ -15,7 +15,7 @@ def with_one(bad, values=RAMP):
 
 
 BAD_VALUES = {  # name: values, words of the message
-    "empty": (np.array([]), "none"),
+    "empty": (np.array([]), "at least 2 samples. Received: 0"),
     "text": (np.array(["a", "b", "c"]), "numbers"),
     "complex": (np.array([1j, 2j, 3j]), "numbers"),
     "constant": (np.full(12, 3.5), "constant 3.5"),

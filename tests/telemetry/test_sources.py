@@ -106,7 +106,7 @@ BAD = {
     "words only": ("a.csv", b"a,b\nx,y\nz,w\n", {}, "none in a.csv"),
     "no columns named": ("a.csv", b"a,b\n1,2\n", {"columns": []}, "columns=[]"),
     "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
-    "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "lists in 'window'"),
+    "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "left out: window ([1. 2.])"),
     "two levels of names": ("a.parquet", pd.DataFrame([[1.0]], columns=pd.MultiIndex.from_tuples([("a", "x")])), {}, "2 levels"),
     "no array": ("a.npy", b"not an array", {}, "a.npy"),
     "a column number too large": ("a.npy", np.zeros((3, 2)), {"columns": ["2"]}, "'2'"),

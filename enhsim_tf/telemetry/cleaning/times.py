@@ -275,17 +275,8 @@ def _plain(text: pd.Series) -> pd.Series:
 
 
 def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
-    """Parses dates of one form."""
-    try:
-        dates = pd.to_datetime(text, format=form, errors="coerce")
-        zoned = np.full(len(dates), isinstance(dates.dtype, pd.DatetimeTZDtype))
-    except ValueError as error:
-        if "ixed" not in str(error):
-            raise
-        dates = pd.to_datetime(text, format=form, utc=True, errors="coerce")  # some state a zone, or another one than others
-        zoned = _has_zone(text, form)
-    if isinstance(dates.dtype, pd.DatetimeTZDtype):
-        dates = dates.dt.tz_convert("UTC").dt.tz_localize(None)
+    """Parses dates of one form; returns them in UTC, and which cells state a zone: by an offset behind a time of day, or by the format."""
+    dates = pd.to_datetime(text, format=form, utc=True, errors="coerce").dt.tz_localize(None)
     left = (dates.isna() & text.notna()).to_numpy()
     if left.any():
         rest = _plain(text[left].astype(str))
@@ -296,16 +287,10 @@ def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
             found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None) + late
             unit = np.promote_types(dates.dtype, found.dtype)  # whole seconds and fractions have different units
             dates = dates.astype(unit).fillna(found.astype(unit))
-        zoned[left] = _has_zone(rest, form)
-    return dates, zoned
-
-
-def _has_zone(text: pd.Series, form: str) -> np.ndarray:
-    """Says which cells state a zone: by an offset behind a time of day, or by the format."""
     if form != _ISO:
-        return np.full(len(text), "%z" in form or "%Z" in form)
+        return dates, np.full(len(text), "%z" in form or "%Z" in form)
     zone = r"[T ]\d\d(?::?\d\d(?::?\d\d(?:[.,]\d+)?)?)?\s?(?:Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)\s*$"
-    return text.str.contains(zone).fillna(False).to_numpy(bool)
+    return dates, text.str.contains(zone).fillna(False).to_numpy(bool)
 
 
 def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:

@@ -61,11 +61,6 @@ def read_table_channels(
     if not isinstance(source, pd.DataFrame | pd.Series):
         what = source.name if isinstance(source, Path) else f"{source[0].name} ..."
     table = _without_repeats(read_table(source, options), columns, time, options, what)
-    for name, cells in table.frame.items():
-        if cells.dtype == object and len(cells) and isinstance(cells.iloc[0], list | np.ndarray):
-            raise InputError(
-                f"Expected one value in each cell. Received: lists in {name!r} of {what}, as in files of windows. Give a series (generate --continuous)."
-            )
     named = list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None  # others are names of series
     layout = lay_out(table, named, time, options, what)
     keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]

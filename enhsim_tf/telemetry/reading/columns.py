@@ -163,10 +163,9 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
     words = {word.casefold() for word in words_of(name)}
     if not (is_unnamed or words <= _ROWS and words) or not np.isfinite(values).all() or (values % 1).any():
         return False
-    share = np.mean(np.diff(values) == 1) if len(values) > 1 else 0.0
-    if is_unnamed or len(values) < 2:
-        return len(np.unique(values)) == len(values) or bool(share > 0.9)
-    return bool(share >= 0.9)
+    if (is_unnamed or len(values) < 2) and len(np.unique(values)) == len(values):
+        return True
+    return len(values) > 1 and bool(np.mean(np.diff(values) == 1) >= 0.9)
 
 
 def _counts(values: np.ndarray) -> bool:

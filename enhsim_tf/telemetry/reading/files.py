@@ -143,12 +143,7 @@ def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
     for table, path in zip(tables, paths, strict=True):
         places += [(row + first, line, name) for first, line, name in table.places] or [(row, 1, path.name)]
         row += len(table.frame)
-    decimals = {table.decimal for table in tables}
-    if len(decimals - {None}) > 1:
-        raise InputError(
-            f"Expected one decimal sign in all files. Received: commas in some of {len(paths)} files. Give decimal (--decimal)."
-        )
     frame = pd.concat([table.frame[names] for table in tables], ignore_index=True)
     findings = [Finding("files", len(paths), f"files read one after the other: {len(paths)}, {paths[0].name} to {paths[-1].name}")]
     findings += list({finding.text: finding for table in tables for finding in table.findings}.values())
-    return Table(frame, Places(places), next(iter(decimals - {None}), None), tuple(findings), tables[0].units)
+    return Table(frame, Places(places), next((each.decimal for each in tables if each.decimal), None), tuple(findings), tables[0].units)
