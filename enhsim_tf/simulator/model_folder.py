@@ -23,7 +23,7 @@ _MOST_ARRAYS = 2**28  # maximum bytes of all arrays; the weights of the paper's 
 _MOST_NAME = 60  # bytes of the name of a folder
 _MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and locks add 50, and most file systems allow 255
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names of Windows
-_NUMBER = "5"  # of the format
+_NUMBER = "6"  # of the format
 _FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
 
 

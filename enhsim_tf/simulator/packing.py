@@ -9,8 +9,7 @@ from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.alignment import Runs, Waves
 from enhsim_tf.telemetry.quantisation import Levels
 
@@ -24,10 +23,7 @@ _ARGUMENTS = {
     Recording: ("parts", "columns", "interval_s", "start", "name"),
     Run: ("values", "offset_s"),
     Enhancer: ("name", "window", "columns", "channels", "centre", "bias", "factors", "layers", "main"),
-    GaussianNoise: ("root", "window", "processes"),
-    GaussianAutoregression: ("coefficients", "innovation_sd"),
-    WindowBootstrap: ("windows", "starts"),
-    MatchedWindowBootstrap: ("windows", "signals", "starts"),
+    WindowBootstrap: ("windows", "signals"),
     Levels: ("step", "origin", "count"),
 }
 """The kinds that are saved, and made again on loading, with the arguments that are saved; each has an attribute of the same name."""

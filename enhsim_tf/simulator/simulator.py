@@ -17,7 +17,7 @@ from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.recording import Recording, record
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
-from enhsim_tf.noise.candidates import NoiseModel
+from enhsim_tf.noise.window_bootstrap import NoiseModel
 from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
 from enhsim_tf.simulator.joint import cut, rounded, windows_of
@@ -38,7 +38,7 @@ class EnhancedSimulator:
     Args:
         alignment: The coarse simulator, and how it is aligned with telemetry.
         enhancer: Maps coarse windows of all columns to windows of all channels.
-        noise: The noise model of all channels, see `noise.candidates`.
+        noise: The noise model of all channels, see `noise.window_bootstrap`.
         channels: Names of the channels.
         interval_s: Sampling interval in seconds.
         levels: For square waves: offset and gain of each channel at several times, in the order of time, shape `(times, channels, 2)`. Each

@@ -28,7 +28,7 @@ from tests.known_simulators import of_waves
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "enhsim_tf"]
-TINY = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "gaussian"]
+TINY = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "residual-windows"]
 
 
 def table(num_samples=1_500):
@@ -191,7 +191,7 @@ def test_fit_prints_the_cleaning_and_the_report(fitted):
         "filled by straight lines",
         "values that cannot be read, taken as missing: 1",
         "volts: signal: error",
-        "volts: noise: gaussian",
+        "volts: noise: residual windows",
         "of held-out time",
         "score uses: ",
         "models/volts/",
@@ -446,7 +446,7 @@ def test_the_commands_of_the_pages_can_be_parsed():
 def test_the_python_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
     page = (ROOT / "docs" / "own_data.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in page.split("```python")[1:] if "fit(" in part.partition("```")[0]]
-    tiny = "FitOptions(window=64, num_windows=40, enhancer='ridge', noise='gaussian')"
+    tiny = "FitOptions(window=64, num_windows=40, enhancer='ridge', noise='residual windows')"
     assert "FitOptions(seed=0)" in snippet and "num_windows=1000" in snippet
     snippet = snippet.replace("FitOptions(seed=0)", tiny).replace("num_windows=1000", "num_windows=20")
     table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)

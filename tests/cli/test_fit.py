@@ -11,7 +11,7 @@ from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.simulator.conftest import joint, series
 
-OPTIONS = FitOptions(window=64, num_windows=100, enhancer="ridge", noise="gaussian")
+OPTIONS = FitOptions(window=64, num_windows=100, enhancer="ridge", noise="residual windows")
 
 
 def table(**more):

@@ -101,7 +101,7 @@ def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
     source, out = tmp_path / "world" / "x.parquet", tmp_path / "world" / "models"
     source.parent.mkdir()
     table_of([*names, "short\x1b[31m\n"], 1_500).assign(**{"short\x1b[31m\n": [1.0] * 2 + [np.nan] * 1_498}).to_parquet(source)
-    tiny = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "gaussian", "--separately", "--workers", "1"]
+    tiny = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "residual-windows", "--separately", "--workers", "1"]
     assert main(["fit", str(source), "--out", str(out), *tiny]) == 2  # one is too short
     made = files_below(tmp_path) - {source}
     assert {path.parent.parent for path in made} == {out} and {path.parent.name for path in made} == set(map(encode_name, names))

@@ -6,13 +6,13 @@ import warnings
 
 import numpy as np
 import pytest
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import Plan
 from enhsim_tf.datasets.shard import make_windows
-from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions
@@ -64,7 +64,8 @@ def broken(simulator, which):
     """The simulator with a NaN in its enhancer or its noise."""
     simulator = copy.copy(simulator)
     if which == "noise":
-        simulator.noise = GaussianNoise(np.full((1, 1), np.nan), simulator.window)
+        simulator.noise = WindowBootstrap(np.zeros((1, simulator.window, 1)))
+        simulator.noise.windows[:] = np.nan
     else:
         simulator.enhancer = dataclasses.replace(simulator.enhancer, bias=simulator.enhancer.bias * np.nan)
     return simulator
@@ -77,7 +78,7 @@ RUN = Recording((Run(np.random.default_rng(1).standard_normal((1_500, 1)).astype
 def of_run():
     """A simulator of recorded runs whose enhancer is ridge regression."""
     values = np.convolve(RUN.parts[0].values[:, 0], [0.3, 0.4, 0.3], "same") + NOISE
-    return fit(channel(values), RUN, dataclasses.replace(TINY, noise="autoregression", num_windows=60))[0]
+    return fit(channel(values), RUN, dataclasses.replace(TINY, num_windows=60))[0]
 
 
 @pytest.mark.parametrize("which", ["enhancer", "noise"])

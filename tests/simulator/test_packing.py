@@ -11,8 +11,8 @@ from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.candidates import fit_enhancer
 from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_FEATURES
-from enhsim_tf.noise.candidates import fit_candidate
-from enhsim_tf.noise.names import CANDIDATES
+from enhsim_tf.noise.names import NOISES
+from enhsim_tf.noise.window_bootstrap import fit_noise
 from enhsim_tf.simulator.alignment import Runs, Waves
 from enhsim_tf.simulator.packing import packed, unpacked
 from enhsim_tf.telemetry.quantisation import Levels
@@ -30,9 +30,9 @@ def again(part):
     return made
 
 
-@pytest.mark.parametrize("name", CANDIDATES)
+@pytest.mark.parametrize("name", NOISES)
 def test_a_saved_noise_model_generates_the_same_noise(name):
-    model = fit_candidate(name, WINDOWS, CLEAN, 10 * np.arange(30))
+    model = fit_noise(name, WINDOWS, CLEAN)
     for number, signal, draw in ((6, CLEAN[:6], "generate"), (90, np.zeros((90, 2)), "generate_series")):
         first, second = (getattr(each, draw)(number, np.random.default_rng(1), signal) for each in (model, again(model)))
         np.testing.assert_array_equal(first, second)
