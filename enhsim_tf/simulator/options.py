@@ -7,7 +7,7 @@ from typing import Any
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
 from enhsim_tf.enhancer.names import BEST, CANDIDATES
-from enhsim_tf.noise.names import MATCHED, NOISES
+from enhsim_tf.noise.names import NOISES, RESIDUAL_WINDOWS
 
 FEWEST_SAMPLES = 32  # minimum window length on request
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
@@ -70,8 +70,8 @@ class FitOptions:
     num_windows: int = _option(1_000, "number of training windows (default: 1000; fewer for many channels)", least=1)
     epochs: int = _option(6, "training epochs of a network (default: 6)", least=1)
     noise: str = _option(
-        MATCHED,
-        "noise model (default: matched-residual-windows, windows of the residual from places with a similar signal)",
+        RESIDUAL_WINDOWS,
+        "noise model (default: residual-windows, whole windows of telemetry minus enhanced signal, drawn again)",
         choices=NOISES,
     )
     enhancer: str = _option(

@@ -1,7 +1,7 @@
 """Scores telemetry with a detector that has learnt from generated nominal telemetry.
 
-The threshold is the larger of two: that of generated telemetry, and that of the nominal telemetry of the fit. Generated telemetry may raise a
-threshold, and never undercuts what real nominal time shows.
+The threshold is the largest of three: that of generated telemetry, that of the nominal telemetry of the fit, and that of its end alone, which was
+held out, since the residual is smaller where the enhancer has learnt. Generated telemetry never undercuts what real nominal time shows.
 """
 
 import dataclasses
@@ -76,9 +76,10 @@ class Scorer:
         else:
             self.detector.fit(self._judged(training))
         generated, self.rate = metrics.finite_threshold(self._of_generated(seed + 1), self.options.false_alarm_rate, self._length)
-        real, self.nominal_threshold = self._of_nominal(), -np.inf
-        if len(real):
-            self.nominal_threshold = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0]
+        self.nominal_threshold = -np.inf
+        for real in self._of_nominal():
+            found, _ = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)
+            self.nominal_threshold = max(self.nominal_threshold, found)
         self.threshold = max(generated, self.nominal_threshold)
 
     @functools.cached_property
@@ -92,23 +93,20 @@ class Scorer:
             series = series - self.simulator.nominal_series(len(series))
         return self._raw(series)
 
-    def _of_nominal(self) -> np.ndarray:
-        """Scores the nominal telemetry of the fit: of parts with too many values the middle."""
+    def _of_nominal(self) -> list[np.ndarray]:
+        """Scores the nominal telemetry of the fit, of parts with too many values the end; and returns those of the held-out end once more."""
         nominal, run = self.simulator.nominal, self.simulator.nominal_run
         if nominal is None:
-            return np.zeros(0)
-        kept = sum(len(part) >= self.window for part in nominal.parts)
-        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, kept)))
+            return []
+        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * len(nominal.parts)))
 
-        def middle(recording: Recording) -> Recording:
-            parts = []
-            for part in recording.parts:
-                first = max(0, (len(part) - most) // 2)
-                parts.append(Run(part.values[first : first + most]))
-            return dataclasses.replace(recording, parts=tuple(parts))
+        def end(recording: Recording) -> Recording:
+            return dataclasses.replace(recording, parts=tuple(Run(part.values[-most:]) for part in recording.parts))
 
-        series = self.simulator.judged_series(middle(nominal), None if run is None else middle(run))
-        return np.concatenate([np.zeros(0), *map(self._raw, series)])
+        series = self.simulator.judged_series(end(nominal), None if run is None else end(run))
+        scores = np.concatenate([np.zeros(0), *map(self._raw, series)])
+        num_held_out = len(nominal) - self.simulator.trained.get("num_samples", len(nominal))
+        return [each for each in (scores, scores[-num_held_out:] if num_held_out else scores[:0]) if len(each)]
 
     def _judged(self, windows: np.ndarray) -> np.ndarray:
         """What the detector sees of windows: one channel as it is, several in units of their standard deviations."""

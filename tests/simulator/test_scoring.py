@@ -157,6 +157,16 @@ def test_nominal_telemetry_of_few_windows_bounds_the_threshold_by_its_largest_sc
     assert tenth.nominal_threshold == pytest.approx(np.sort(by_hand(loud[:, 0]))[int(np.ceil(481 * 0.9)) - 1], rel=1e-6)
 
 
+def test_the_held_out_end_of_nominal_telemetry_bounds_the_threshold_by_itself(largest):
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    nominal = simulator.generate_series(4_800, seed=7)
+    nominal[-960:] *= 2  # 40 windows, whose largest score is above a tenth of those of all
+    simulator.nominal, simulator.trained = Recording((Run(nominal),), ("volts",), 1.0, None), {"num_samples": 3_840}
+    scorer = Scorer(simulator, ScoreOptions(largest, num_windows=20, false_alarm_rate=0.3))
+    late = np.sort(by_hand(nominal[:, 0])[-960:])
+    assert scorer.threshold == pytest.approx(late[int(np.ceil(961 * 0.7)) - 1], rel=1e-6)
+
+
 def test_scores_with_a_threshold_below_zero_are_shifted(largest):
     waves = SquareWaveSimulator([SquareWave(20, low=-101.0, high=-99.0)])
     simulator = of_waves([waves], 8, noise_sd=0.2)  # a window begins at every sample
