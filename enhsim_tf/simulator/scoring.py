@@ -23,7 +23,7 @@ from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_squ
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL
 from enhsim_tf.enhancer.model import run_starts
-from enhsim_tf.simulator.joint import cut, telemetry_of
+from enhsim_tf.simulator.joint import cut, split_end, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
@@ -94,19 +94,25 @@ class Scorer:
         return self._raw(series)
 
     def _of_nominal(self) -> list[np.ndarray]:
-        """Scores the nominal telemetry of the fit, of parts with too many values the end; and returns those of the held-out end once more."""
+        """Scores the nominal telemetry of the fit, and its held-out end once more, as a series of its own."""
         nominal, run = self.simulator.nominal, self.simulator.nominal_run
         if nominal is None:
             return []
+        held_out = 1 - self.simulator.trained.get("num_samples", len(nominal)) / len(nominal)
+        found = [self._of_recording(nominal, run)]
+        if held_out:
+            found.append(self._of_recording(*(split_end(each, held_out)[1] for each in (nominal, run))))
+        return [scores for scores in found if len(scores)]
+
+    def _of_recording(self, nominal: Recording, run: Recording | None) -> np.ndarray:
+        """Scores nominal telemetry: of parts with too many values the end."""
         most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * len(nominal.parts)))
 
         def end(recording: Recording) -> Recording:
             return dataclasses.replace(recording, parts=tuple(Run(part.values[-most:]) for part in recording.parts))
 
         series = self.simulator.judged_series(end(nominal), None if run is None else end(run))
-        scores = np.concatenate([np.zeros(0), *map(self._raw, series)])
-        num_held_out = len(nominal) - self.simulator.trained.get("num_samples", len(nominal))
-        return [each for each in (scores, scores[-num_held_out:] if num_held_out else scores[:0]) if len(each)]
+        return np.concatenate([np.zeros(0), *map(self._raw, series)])
 
     def _judged(self, windows: np.ndarray) -> np.ndarray:
         """What the detector sees of windows: one channel as it is, several in units of their standard deviations."""

@@ -163,7 +163,7 @@ def test_the_held_out_end_of_nominal_telemetry_bounds_the_threshold_by_itself(la
     nominal[-960:] *= 2  # 40 windows, whose largest score is above a tenth of those of all
     simulator.nominal, simulator.trained = Recording((Run(nominal),), ("volts",), 1.0, None), {"num_samples": 3_840}
     scorer = Scorer(simulator, ScoreOptions(largest, num_windows=20, false_alarm_rate=0.3))
-    late = np.sort(by_hand(nominal[:, 0])[-960:])
+    late = np.sort(by_hand(nominal[-960:, 0]))
     assert scorer.threshold == pytest.approx(late[int(np.ceil(961 * 0.7)) - 1], rel=1e-6)
 
 
