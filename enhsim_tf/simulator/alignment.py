@@ -9,7 +9,6 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.degraded import Degraded, held_samples
-from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import pair_recordings
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
@@ -180,8 +179,7 @@ class Runs:
         nominal: The nominal run of the fit, whose columns are the inputs of the enhancer.
         window: Length of a window in samples.
         delay_s: How much later the telemetry is than the coarse run, in seconds.
-        coarse: The coarse simulator, or None if only a recorded run is known. Its code is not saved.
-        name: Name of the coarse simulator.
+        name: Name of the coarse simulator. Empty: that of the run.
         commands: The traces, if the run are commands of the telemetry's own file.
     """
 
@@ -190,12 +188,11 @@ class Runs:
         nominal: Recording,
         window: int,
         delay_s: float = 0.0,
-        coarse: CoarseSimulator | None = None,
         name: str = "",
         commands: CommandTraces | None = None,
     ):
-        self.nominal, self.window, self.delay_s, self.coarse = nominal, int(window), float(delay_s), coarse
-        self.name, self.commands = name or (name_of(coarse) if coarse is not None else nominal.name), commands
+        self.nominal, self.window, self.delay_s = nominal, int(window), float(delay_s)
+        self.name, self.commands = name or nominal.name, commands
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -244,8 +244,7 @@ def _fit_runs(
     starts = evenly_spaced_starts(learnt.parts, window, number)
     (inputs, targets), times = (windows_of(each, starts, window) for each in (learnt_run, learnt)), times_of(learnt, starts, window)
     choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, progress)
-    known = None if isinstance(coarse, Recording) else coarse
-    alignment = Runs(learnt_run, window, delay.seconds, known, name_of(coarse), commands)
+    alignment = Runs(learnt_run, window, delay.seconds, name_of(coarse), commands)
     simulator = EnhancedSimulator(alignment, choice.enhancer, None, recording.columns, recording.interval_s, nominal=learnt)
     residuals = _held_out_residuals(simulator, choice, inputs, targets, times, options)
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
-from enhsim_tf.coarse_simulator.recording import Recording, record
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.noise.window_bootstrap import NoiseModel
@@ -341,20 +340,6 @@ class EnhancedSimulator:
             rng = np.random.default_rng([seed, 1, number])
             yield [self.add_noise(enhanced, rng) for enhanced in clean]
 
-    def simulate(self, time_s: np.ndarray, scenario: Any = None, seed: int = 0, labels: Mapping[str, Any] | None = None) -> Recording:
-        """Runs the coarse simulator at times with the interval of this one, see `recording.record`; the seed is that of the scenario.
-
-        Raises:
-            InputError: If there is no simulator, because this one was loaded and code is not saved.
-        """
-        runs = self.recorded_runs()
-        if runs.coarse is None:
-            raise InputError(
-                f"Expected the coarse simulator {runs.name}, which is not saved with the model. Received: none. "
-                "Give it again, as in EnhancedSimulator.load(folder, coarse=simulator), or give a recorded run."
-            )
-        return record(runs.coarse, time_s, scenario, np.random.default_rng(seed), labels=labels)
-
     def recorded_runs(self) -> Runs:
         """Returns the alignment of a simulator of recorded runs; raises InputError if it is one of square waves."""
         if not isinstance(self.alignment, Runs):
@@ -376,26 +361,9 @@ class EnhancedSimulator:
         write_saved(folder, arrays, settings | {"trained": self.trained})
 
     @classmethod
-    def load(cls, folder: str | os.PathLike, coarse: CoarseSimulator | None = None) -> "EnhancedSimulator":
-        """Loads a saved simulator.
-
-        Args:
-            folder: A folder written by `save`.
-            coarse: The coarse simulator, for a model of the user's own simulator, whose code is not saved.
-
-        Raises:
-            InputError: If the folder was not written by `save`, a file in it has changed since, or the coarse simulator has other columns.
-        """
-        simulator = read_saved(folder, cls._from_saved)
-        if coarse is not None:
-            runs = simulator.recorded_runs()
-            if set(runs.columns) - set(coarse.columns):
-                raise InputError(
-                    f"Expected a simulator with the columns {', '.join(runs.columns)[:120]}. Received: {name_of(coarse)} with "
-                    f"{', '.join(coarse.columns)[:120]}. Give the simulator of the fit."
-                )
-            runs.coarse = coarse
-        return simulator
+    def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
+        """Loads a saved simulator; raises InputError if the folder was not written by `save`, or a file in it has changed since."""
+        return read_saved(folder, cls._from_saved)
 
     @classmethod
     def _from_saved(cls, arrays: dict[str, np.ndarray], settings: Mapping[str, Any]) -> "EnhancedSimulator":

@@ -55,10 +55,10 @@ def test_saved_waves_and_levels_are_the_same(part):
     assert made.simulators[0].waves == part.waves and made.simulators[0].levels == part.levels
 
 
-def test_saved_runs_are_the_same_without_their_code():
+def test_saved_runs_are_the_same():
     recording = Recording((Run(WINDOWS[0]), Run(WINDOWS[1], 90.0)), ("a", "b"), 2.0, "2024-01-01T00:00:00+00:00", "a box")
-    made = again(Runs(recording, 40, 3.0, SimpleNamespace(), "a heater", CommandTraces([(2, 8.0)])))
-    assert (made.window, made.delay_s, made.coarse, made.name, made.commands.chosen) == (40, 3.0, None, "a heater", ((2, 8.0),))
+    made = again(Runs(recording, 40, 3.0, "a heater", CommandTraces([(2, 8.0)])))
+    assert (made.window, made.delay_s, made.name, made.commands.chosen) == (40, 3.0, "a heater", ((2, 8.0),))
     assert (made.columns, made.nominal.start, made.nominal.name) == (("a", "b"), recording.start, "a box")
     for part, expected in zip(made.nominal.parts, recording.parts, strict=True):
         assert part.offset_s == expected.offset_s

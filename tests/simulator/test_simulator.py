@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.interface import FunctionSimulator
 from enhsim_tf.coarse_simulator.recording import Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
@@ -83,17 +82,6 @@ def test_copies_of_a_run_differ_by_their_noise_alone(of_run):
     assert np.sqrt(np.mean((clean[:, 0] - (5 + 2 * smooth_wave(200))) ** 2)) < 0.05
     (again,) = next(simulator.generate_copies(run, 1, seed=0))
     np.testing.assert_array_equal(first, again)
-
-
-def test_a_simulator_of_runs_is_given_its_code_again(of_run, tmp_path):
-    of_run[0].save(tmp_path / "model")
-    with pytest.raises(InputError, match="EnhancedSimulator.load"):
-        EnhancedSimulator.load(tmp_path / "model").simulate(np.arange(10.0))
-    with pytest.raises(InputError, match="columns square, ramp"):
-        EnhancedSimulator.load(tmp_path / "model", FunctionSimulator(np.sin, ["other"]))
-    wave = FunctionSimulator(lambda time_s: np.stack([np.sign(np.sin(time_s)), time_s], axis=1), ["square", "ramp"])
-    run = EnhancedSimulator.load(tmp_path / "model", wave).simulate(10.0 * np.arange(100))
-    assert run.columns == ("square", "ramp") and len(run) == 100
 
 
 @pytest.mark.parametrize(
