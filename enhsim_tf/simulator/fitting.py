@@ -18,6 +18,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, choose_enhancer, fit_enhancer, split_fold
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
+from enhsim_tf.noise.names import MATCHED, RESIDUAL_WINDOWS
 from enhsim_tf.noise.window_bootstrap import fit_noise
 from enhsim_tf.simulator.alignment import Runs, Waves
 from enhsim_tf.simulator.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse
@@ -344,7 +345,8 @@ def _finish(
     learnt, run = simulator.nominal, simulator.nominal_run
     simulator.quantisation = tuple(map(Levels.find, learnt.values.T))
     progress.step("noise")
-    simulator.noise = fit_noise(options.noise, noise, clean)
+    name = options.noise or (MATCHED if run is None else RESIDUAL_WINDOWS)  # the signal of a run seldom repeats: its neighbours are few
+    simulator.noise = fit_noise(name, noise, clean)
     progress.step("detectors")
     judged_on, judged_run = (learnt, run) if held_out is None else (held_out, held_out_run)
     detectors = judge_detectors(simulator, judged_on, judged_run, options.seed)
@@ -353,7 +355,7 @@ def _finish(
         "telemetry": learnt.name,
         "num_samples": len(learnt),
         "options": dataclasses.asdict(options),
-        "noise": options.noise,
+        "noise": name,
         "detector": chosen.name,
         "keeps_promise": bool(chosen.keeps),
         "false_alarms": chosen.false_alarms,
