@@ -30,7 +30,7 @@ _PLACES = {
     "clean": "telemetry.cleaning.clean",
     "events_table": "simulator.scoring",
     "fit": "simulator.fitting",
-    "inject_channel": "datasets.inject",
+    "inject": "datasets.inject",
     "join_channels": "simulator.joint",
     "read_recording": "coarse_simulator.recording_files",
     "read_source": "telemetry.sources",

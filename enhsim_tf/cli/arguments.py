@@ -178,7 +178,7 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
     inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at random places, or all; they are used in turn")
     inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at random places (default: one of each kind)")
     severity = "severity in standard deviations of the noise, or a range (default: 4)"
-    inject.add_argument("--severity", default="4", metavar="SD[:SD]", help=severity)
+    inject.add_argument("--severity", metavar="SD[:SD]", help=severity)
     noise = "standard deviation of the noise (default: estimated from second differences)"
     inject.add_argument("--noise-sd", type=float, metavar="SD", help=noise)
     _add_events(inject, "anomaly", "KIND", "ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h")

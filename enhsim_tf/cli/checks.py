@@ -47,17 +47,21 @@ def _check_update(options: argparse.Namespace) -> None:
 
 
 def _check_inject(options: argparse.Namespace) -> None:
-    from enhsim_tf.datasets.inject_options import INJECTIONS, InjectOptions
+    from enhsim_tf.datasets.inject_options import INJECTIONS, WITHOUT_SEVERITY, InjectOptions
     from enhsim_tf.datasets.places import split_limits
 
     kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
-    least, greatest = split_limits("severity", options.severity)
+    least, greatest = split_limits("severity", options.severity or "4")
     try:
         severity = float(least), float(greatest)
     except ValueError:
         raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
     length = split_limits("length", options.length)
     options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed)
+    if options.chosen.is_joint:
+        _refuse(options, f"with {kinds[0]}, which has drawn places and the estimated noise", "at", "noise_sd")
+        if set(kinds) <= set(WITHOUT_SEVERITY):
+            _refuse(options, f"with {', '.join(kinds)}: of the kinds of several channels, common_shift alone has one", "severity")
     options.cleaning = cleaning_options(options, 3)
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.cli.options import counted, for_each, output_paths, refuse_same_file
+from enhsim_tf.cli.options import for_each, output_paths, refuse_same_file
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.errors import InputError, counted, printable
 from enhsim_tf.datasets.generate import generate_data_set
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
@@ -91,8 +91,8 @@ def _generate_copies(options: argparse.Namespace) -> int:
         lines = [*run.notes, *coverage_lines(model, run)]
         if runs.delay_s:
             lines.append(f"times are those of the telemetry, {runs.delay_s:g} s after those of the run")
-        noun, samples = "copy" if copies == 1 else "copies", counted(num_rows // copies, "sample")
-        for line in [*lines, f"{copies:,} {noun} of {samples}, one every {model.interval_s:g} s, in {paths[name]}"]:
+        samples = counted(num_rows // copies, "sample")
+        for line in [*lines, f"{counted(copies, 'copy')} of {samples}, one every {model.interval_s:g} s, in {paths[name]}"]:
             tell(f"{printable(name)}: {line}")
 
     return for_each(models, write)

@@ -41,11 +41,6 @@ def tell_failed(failed: dict[str, str]) -> int:
     return 2 if failed else 0
 
 
-def counted(number: int, noun: str) -> str:
-    """Formats a number with its noun, for example `1 window` or `2,000 windows`."""
-    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
-
-
 def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
     """Returns the output file of each channel.
 

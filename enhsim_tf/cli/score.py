@@ -9,14 +9,13 @@ import pandas as pd
 from enhsim_tf.cli.options import (
     channels_by_model,
     cleaned_channels,
-    counted,
     for_each,
     output_paths,
     refuse_same_file,
     run_for,
 )
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import printable, spoken
+from enhsim_tf.common.errors import counted, printable, spoken
 from enhsim_tf.simulator.model_folder import models_of
 from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
 from enhsim_tf.simulator.simulator import EnhancedSimulator
