@@ -33,6 +33,10 @@ def run_inject(options: argparse.Namespace) -> int:
             tables = {name: inject(each.parts, chosen) for name, each in cleaned.items()}
         frame = join_injected(tables) if len(tables) > 1 else next(iter(tables.values()))
         write_table(path, frame, channels if options.timeeval else ())
+        if options.figure:
+            from enhsim_tf.simulator.figures import inject_figure  # matplotlib is slow to import
+
+            inject_figure(frame, channels).savefig(path.with_suffix(".png"), dpi=200, format="png")
         lines = lines_of([each.report for each in cleaned.values()])
         said = "given" if chosen.noise_sd is not None else "estimated from second differences"
         for name, table in tables.items():

@@ -311,8 +311,9 @@ def test_a_simulator_of_several_channels_has_one_file(told, tmp_path):
 
 def test_inject_writes_labelled_telemetry(told, tmp_path):
     place = ["--at", "level_shift:8@2024-01-01T02:00/5min"]
-    arguments = ["--kinds", "all", "--length", "20:60", *place, "--seed", 3, "--out", "x.parquet"]
+    arguments = ["--kinds", "all", "--length", "20:60", *place, "--seed", 3, "--figure", "--out", "x.parquet"]
     code, out, errors = told("inject", "WORLD/one.csv", *arguments)
+    assert {path.name for path in tmp_path.iterdir()} == {"x.parquet", "x.png"}
     assert code == 0 and not errors and "9 anomalies" in out and "noise sd 0.19" in out
     frame = pd.read_parquet(tmp_path / "x.parquet")
     assert list(frame) == ["time", "value", "scenario", "severity", "onset", "end", "mask"]
