@@ -61,7 +61,7 @@ def report_figure(report: Report) -> matplotlib.figure.Figure:
             axes.locator_params(axis="y", nbins=4)
             axes.ticklabel_format(axis="y", useOffset=False)
             axes.set_xlabel("sample" if row == len(shown) - 1 else "")
-        signal.set_ylabel(drawable(name, 14))
+        signal.set_ylabel(drawable(name, 14), parse_math=False)
     title_words(grid[0, 0], [("real", REAL), ("coarse (dashed)", COARSE), ("enhanced", ENHANCED)])
     title_words(grid[0, 1], [("generated", GENERATED)])
     names = [each["name"] for each in report.detectors]
@@ -142,7 +142,7 @@ class _Sheet:
         self.figure, down = new_sheet(DOUBLE, 1.0 + (0.95 + above) * len(labels), title, subtitle)
         self.axes = panels(self.figure, down + above, len(labels), 1, gap=(above + 0.04, 0.0), sharex=True)[:, 0]
         for axes, label in zip(self.axes, labels, strict=True):
-            axes.set_ylabel(drawable(label, 14))
+            axes.set_ylabel(drawable(label, 14), parse_math=False)
         last = self.axes[-1]
         if has_time:
             locator = matplotlib.dates.AutoDateLocator(minticks=3, maxticks=7)
@@ -195,7 +195,7 @@ def _shown_channels(frame: pd.DataFrame, simulator: EnhancedSimulator) -> list[s
 
 
 def drawable(text: str, most_letters: int) -> str:
-    """Returns text as one line that the font can draw: unknown characters are replaced, `$` is escaped, and longer text is shortened."""
+    """Returns text as one line that the font can draw: unknown characters are replaced, and longer text is shortened."""
     letters = font_manager.get_font(font_manager.findfont("DejaVu Sans")).get_charmap()
     known = "".join(letter if ord(letter) in letters else "?" for letter in printable(text))
-    return (known if len(known) <= most_letters else f"{known[: most_letters - 3]}...").replace("$", r"\$")
+    return known if len(known) <= most_letters else f"{known[: most_letters - 3]}..."
