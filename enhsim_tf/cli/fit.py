@@ -25,7 +25,7 @@ from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from enhsim_tf.common.size_limits import short_reason
+from enhsim_tf.common.read_errors import short_reason
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.report import Report

@@ -48,9 +48,6 @@ class Waves:
         self.simulators, self.channels = tuple(simulators), tuple(channels)
         self.interval_s, self.window = float(interval_s), int(window)
         self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
-        known = [each.shape for each in self.waveforms if each is not None]
-        if any(shape != (_NUM_PHASES, self.window) for shape in known):
-            raise InputError(f"Expected waveforms of shape {(_NUM_PHASES, self.window)}. Received: {known}. Learn them at all phases.")
         self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.read_errors import READ_ERRORS, short_reason
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.noise.window_bootstrap import NoiseModel
 from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs
@@ -363,46 +363,13 @@ class EnhancedSimulator:
     @classmethod
     def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
         """Loads a saved simulator; raises InputError if the folder was not written by `save`, or a file in it has changed since."""
-        return read_saved(folder, cls._from_saved)
-
-    @classmethod
-    def _from_saved(cls, arrays: dict[str, np.ndarray], settings: Mapping[str, Any]) -> "EnhancedSimulator":
-        with np.errstate(all="ignore"):  # what is not finite is refused
-            parts = {name: unpacked(settings[name], arrays) for name in _SAVED}
-            if arrays:
-                raise ValueError(f"{len(arrays)} arrays of no part")
-            simulator = cls(**parts, trained=settings["trained"])
-            simulator._check_parts()
-        return simulator
-
-    def _check_parts(self) -> None:
-        """Raises ValueError, or another of `READ_ERRORS`, unless the parts of a loaded simulator are of the right kinds and fit together."""
-        alignment, enhancer, size = self.alignment, self.enhancer, len(self.channels)
-        clock = alignment.nominal if self.is_run_model else alignment
-        recordings = [each for each in (self.nominal, self.nominal_run) if each is not None]
-        runs = [run for each in recordings for run in each.parts]
-        fits = {
-            "channels": all(isinstance(name, str) for name in self.channels),
-            "interval": clock.interval_s == self.interval_s > 0 and self.level_step > 0,
-            "alignment": alignment.window == self.window and len(alignment.columns) == enhancer.columns,
-            "commands": not self.is_run_model or isinstance(alignment.commands, CommandTraces | None),
-            "enhancer": enhancer.channels == size and enhancer.bias.shape == (self.window * size,),
-            "noise": getattr(self.noise, "window", self.window) == self.window,
-            "levels": (self.levels is None) == self.is_run_model,
-            "quantisation": len(self.quantisation) == size,
-            "nominal": self.nominal is None or (self.nominal.columns, self.nominal.interval_s) == (self.channels, self.interval_s),
-            "parts": len({tuple(map(len, each.parts)) for each in recordings}) <= 1,
-            "start": all(isinstance(each.start, str | None) for each in recordings),
-            "runs": all(run.values.dtype == np.float32 and np.isfinite(run.offset_s) for run in runs),
-        }
-        if not all(fits.values()):
-            raise ValueError(f"parts that do not fit together: {', '.join(name for name, does in fits.items() if not does)}")
-        shape = (1, self.window, size)
-        if self.noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
-            raise ValueError("noise of another shape")
-        window = self.generate(1)  # fails, as the residuals do, if a part is of another kind or an array of another shape
-        if not self.is_run_model:
-            self.residuals(window)
+        arrays, settings = read_saved(folder)
+        try:
+            return cls(**{name: unpacked(settings[name], arrays) for name in _SAVED}, trained=settings["trained"])
+        except READ_ERRORS as error:
+            raise InputError(
+                f"Expected the parts of a simulator. Received: {folder} ({short_reason(error)}). Fit it again with this version."
+            ) from None
 
 
 def _changed_events(changed: np.ndarray, events: Sequence[tuple[Degraded, int, int]]) -> list[tuple[str, float, int, int]]:

@@ -1,11 +1,7 @@
-import copy
-import dataclasses
-
 import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.recording import Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator import simulator as module
@@ -63,14 +59,6 @@ def test_a_loaded_simulator_generates_the_same(kind, request, tmp_path):
     np.testing.assert_array_equal(loaded.generate(5, seed=1), simulator.generate(5, seed=1))
     np.testing.assert_array_equal(loaded.generate_series(300, seed=1), simulator.generate_series(300, seed=1))
     assert loaded.trained == simulator.trained and loaded.channels == simulator.channels
-
-
-def test_a_model_whose_run_is_longer_than_its_telemetry_is_refused(of_run, refused, tmp_path):
-    simulator = copy.copy(of_run[0])
-    simulator.nominal = dataclasses.replace(simulator.nominal, parts=(Run(simulator.nominal.values[:-1]),))
-    simulator.save(tmp_path / "model")
-    with refused("do not fit together: parts"):
-        EnhancedSimulator.load(tmp_path / "model")
 
 
 def test_copies_of_a_run_differ_by_their_noise_alone(of_run):

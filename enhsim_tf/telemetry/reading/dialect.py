@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import MAX_COLUMNS
+from enhsim_tf.common.read_errors import MAX_COLUMNS
 from enhsim_tf.telemetry.cleaning.report import Finding
 
 BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
