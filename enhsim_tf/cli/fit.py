@@ -10,7 +10,6 @@ import dataclasses
 import functools
 import json
 import os
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -119,27 +118,18 @@ def _name(group: Group) -> str:
 
 
 def _fitted_by_processes(work: Callable[[Group], Outcome], groups: Sequence[Group], engine: str, workers: int | None) -> Iterator[Outcome]:
-    """Fits the channels with an engine. A channel whose worker dies repeatedly is reported and does not stop the others."""
-    batches = [(groups, workers)]
-    while batches:
-        some, workers = batches.pop()
-        waiting = {_name(group): group for group in some}
+    """Fits the channels with an engine. If its workers keep dying, the channels that they had taken fail, and the others are fitted."""
+    waiting = {_name(group): group for group in groups}
+    while waiting:
         try:
-            with contextlib.closing(engines.run(engine, work, some, workers)) as running:
+            with contextlib.closing(engines.run(engine, work, list(waiting.values()), workers)) as running:
                 for outcome in running:
                     del waiting[outcome.name]
                     yield outcome
         except ProcessesDiedError as died:
-            suspects = [waiting.pop(_name(group)) for group in died.items if _name(group) in waiting]
-            if not suspects:
-                raise
-            if len(some) == 1:
-                what = "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory."
-                yield Outcome(_name(some[0]), failed=dict.fromkeys(some[0], f"{what} Give less telemetry."))
-                continue
-            batches += [(list(waiting.values()), workers)] if waiting else []
-            # one at a time, to find the one that kills its worker, and to give it all the memory
-            batches += [([group], 1) for group in suspects]
+            for group in died.items:
+                del waiting[_name(group)]
+                yield Outcome(_name(group), failed=dict.fromkeys(group, str(died)))
 
 
 def fit_or_say(
@@ -190,10 +180,6 @@ def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
     except (OSError, MemoryError) as error:  # concerns all channels
         said = f"{short_reason(error)}. Finished channels are kept; free some space."
         raise InputError(f"Expected enough memory and disk space. Received: {said}") from error
-    except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
-        where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
-        said = f"{type(error).__name__}: {reason}, in {Path(where.filename).name}, line {where.lineno}"
-        outcome.failed |= dict.fromkeys(names, f"Expected a fit. Received: {said}. Please report this defect.")
 
 
 def _save(simulator: EnhancedSimulator, report: Report, cleaned: Mapping[str, Cleaned], out: Path, outcome: Outcome) -> None:

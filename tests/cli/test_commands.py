@@ -1,6 +1,5 @@
 """End-to-end tests of the commands, and their error messages for invalid input."""
 
-import argparse
 import json
 import os
 import re
@@ -16,14 +15,12 @@ import pytest
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
-from enhsim_tf.cli import fit
 from enhsim_tf.cli.arguments import parse
 from enhsim_tf.cli.checks import cleaning_options
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.simulator.model_folder import channels_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.known_simulators import of_waves
 
 ROOT = Path(__file__).parents[2]
@@ -363,13 +360,6 @@ def test_a_fit_that_fails_says_it_once_and_leaves_no_new_folder(told, tmp_path):
     code, _, errors = told("fit", "WORLD/two.csv", "--coarse", "RUNS/later.csv", "--out", "old/new/models")
     assert (code, len(errors)) == (2, 1) and errors[0].startswith("error: volts, amps: Expected a coarse run that overlaps")
     assert [path.name for path in tmp_path.rglob("*")] == ["old", "empty"]
-
-
-def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
-    monkeypatch.setattr(fit, "_cleaned", lambda *arguments: {}["defect"])
-    outcome = fit.fit_or_say({"volts": None}, Path("x"), argparse.Namespace(cleaning=Cleaning()), None, None)
-    line = outcome.failed["volts"]
-    assert not outcome.reports and len(line.splitlines()) == 1 and "KeyError" in line and "'defect'" in line
 
 
 def test_several_sources_and_what_reading_takes_are_options():
