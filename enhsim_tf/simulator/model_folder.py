@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
-from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.errors import InputError
 
 MANIFEST, _SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
 _MOST_NAME = 60  # bytes of the name of a folder
@@ -66,24 +66,17 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
     models = Path(os.path.abspath(models))  # so that "." has a name too
     if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
-    folders = [manifest.parent for manifest in sorted(models.glob(f"[!.]*/{MANIFEST}"))] if os.path.isdir(models) else []
-    found = {urllib.parse.unquote(folder.name): folder for folder in folders}
-    if len(found) < len(folders):
-        raise InputError(
-            f"Expected one folder for each simulator. Received: two of one name in {printable(str(models))[:200]}. Rename one."
-        )
-    if not found:
-        raise InputError(
-            f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which contains none. Make one with `fit`."
-        )
-    return found
+    manifests = sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else []
+    if not manifests:
+        raise InputError(f"Expected a folder of fitted simulators. Received: {models}, which contains none. Make one with `fit`.")
+    return {urllib.parse.unquote(manifest.parent.name): manifest.parent for manifest in manifests}
 
 
 def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dict[str, Path]:
     """Selects models of `models_of` by name; None or an empty sequence selects all. Raises InputError for a name that there is not."""
     unknown = [name for name in channels or () if name not in models]
     if unknown:
-        raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
+        raise InputError(f"Expected --channel, one of: {', '.join(list(models)[:8])}. Received: {unknown[0]!r}.")
     return {name: models[name] for name in channels or models}
 
 
@@ -103,20 +96,12 @@ def refuse_foreign(folder: str | os.PathLike) -> None:
 def write_saved(folder: str | os.PathLike, arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any]) -> None:
     """Writes a simulator to a folder atomically, in place of one that was there: its arrays by name, and settings in plain JSON types.
 
-    Raises InputError if the folder contains something else, or if a number is not finite.
+    Raises InputError if the folder contains something else.
     """
     refuse_foreign(folder)
-    bad = sorted({name.partition("/")[0] for name, each in arrays.items() if not np.isfinite(each).all()})
     with replace_folder(folder) as temporary:
-        try:
-            write_json(temporary / _SETTINGS, settings)
-        except ValueError:  # JSON has no NaN and no infinity
-            bad.append("settings")
-        if bad:
-            raise InputError(
-                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. It was not saved. Fit it again."
-            )
         np.savez(temporary / _ARRAYS, **arrays)
+        write_json(temporary / _SETTINGS, settings)
         checksums = {name: sha256(temporary / name) for name in (_ARRAYS, _SETTINGS)}
         write_json(temporary / MANIFEST, {"format": _FAMILY + _NUMBER, "sha256": checksums})
 

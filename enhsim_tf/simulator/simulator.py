@@ -354,7 +354,7 @@ class EnhancedSimulator:
         """Saves the simulator to a folder, see `model_folder`, in place of one that was saved there before.
 
         Raises:
-            InputError: If the folder contains something else, or if a number is not finite; the folder is left unchanged.
+            InputError: If the folder contains something else; it is left unchanged.
         """
         arrays: dict[str, np.ndarray] = {}
         settings = {name: packed(getattr(self, name), arrays, name) for name in _SAVED}

@@ -48,14 +48,6 @@ def test_separate_simulators_have_the_same_bytes_in_this_process_and_in_another(
     assert sums[0] == sums[1]
 
 
-def test_two_folders_of_one_name_are_refused(tmp_path, refused):
-    for name in ("a b", "a%20b"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "manifest.json").touch()
-    with refused("two of one name"):
-        models_of(tmp_path)
-
-
 def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
     fast = pd.Series(series(6_000).values, pd.date_range("2024-01-01", periods=6_000, freq="1s", tz="UTC"))
     reports, failed, _ = fitted(tmp_path, table() | {"fast": fast})

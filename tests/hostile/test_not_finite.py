@@ -83,7 +83,7 @@ def of_run():
 
 @pytest.mark.parametrize("which", ["enhancer", "noise"])
 @pytest.mark.parametrize("kind", ["waves", "runs"])
-def test_what_is_not_finite_is_neither_generated_nor_scored_nor_saved(kind, which, of_run, refused, tmp_path):
+def test_what_is_not_finite_is_neither_generated_nor_scored(kind, which, of_run, refused, tmp_path):
     waves = of_waves([SquareWaveSimulator([SquareWave(40)])], 64)
     simulator = broken(waves if kind == "waves" else of_run, which)
     (telemetry,), run = join_channels({"volts": channel(WAVE)}), None if kind == "waves" else RUN
@@ -96,6 +96,4 @@ def test_what_is_not_finite_is_neither_generated_nor_scored_nor_saved(kind, whic
     for use in uses if kind == "waves" else [*uses, lambda: list(simulator.generate_copies(RUN, 1))]:
         with refused("finite", "Fit it again"):
             use()
-    with refused(which, "not saved"):
-        simulator.save(tmp_path / "model")
     assert not list(tmp_path.iterdir())
