@@ -24,12 +24,11 @@ from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from enhsim_tf.common.read_errors import short_reason
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.report import Report
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
+from enhsim_tf.telemetry.cleaning.clean import Cleaned, clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
 from enhsim_tf.telemetry.series import check_values
 from enhsim_tf.telemetry.sources import read_source
@@ -139,47 +138,33 @@ def fit_or_say(
     read_run: Callable[..., Recording] | None,
     commands: np.ndarray | None,
 ) -> Outcome:
-    """Fits the channels of a group. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
+    """Fits the channels of a group. An InputError about some of them is returned; lack of disk space or memory is raised."""
     from enhsim_tf.simulator.fitting import fit
 
     cleaned, outcome = {}, Outcome(_name(group))
     for name, series in group.items():
-        with _failing(outcome, [name]):
-            cleaned[name] = _cleaned(name, series, options.cleaning)
+        try:
+            found = clean(series, options.cleaning)
+            check_values(np.concatenate([part.values for part in found.parts]), name)
+            cleaned[name] = found
+        except InputError as error:
+            outcome.failed[name] = str(error)
     outcome.lines += lines_of([each.report for each in cleaned.values()])
     groups = join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []
     if len(groups) > 1:
         others = "; ".join(spoken(each.columns) for each in groups)
         outcome.lines.append(f"channels of other sampling intervals or times get a simulator of their own: {others}")
+    speaks = options.engine == "local" and not options.json
     for telemetry in groups:
-        with _failing(outcome, telemetry.columns):
-            speaks = options.engine == "local" and not options.json
-            progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if speaks else SILENT
-            interval_s = telemetry.interval_s if telemetry.start is not None else None
+        progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if speaks else SILENT
+        interval_s = telemetry.interval_s if telemetry.start is not None else None
+        try:
             run = None if read_run is None else read_run(interval_s=interval_s)
             fitted = fit(telemetry, run, options.chosen, progress, commands if len(group) == 1 else None)
             _save(*fitted, cleaned, out, outcome)
+        except InputError as error:
+            outcome.failed |= dict.fromkeys(telemetry.columns, str(error))
     return outcome
-
-
-def _cleaned(name: str, series: pd.Series, cleaning: Cleaning) -> Cleaned:
-    cleaned = clean(series, cleaning)
-    check_values(np.concatenate([part.values for part in cleaned.parts]), name)
-    return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
-
-
-@contextlib.contextmanager
-def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
-    """Notes why work on channels could not be done."""
-    try:
-        yield
-    except InputError as error:
-        outcome.failed |= dict.fromkeys(names, str(error))
-    except BrokenPipeError:  # the reader has left, which ends the command
-        raise
-    except (OSError, MemoryError) as error:  # concerns all channels
-        said = f"{short_reason(error)}. Finished channels are kept; free some space."
-        raise InputError(f"Expected enough memory and disk space. Received: {said}") from error
 
 
 def _save(simulator: EnhancedSimulator, report: Report, cleaned: Mapping[str, Cleaned], out: Path, outcome: Outcome) -> None:

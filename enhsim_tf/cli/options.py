@@ -124,10 +124,5 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
         raise InputError(
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."
         )
-    columns = simulator.alignment.columns
-    try:
-        return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)
-    except InputError as error:
-        if series.table is None or not set(columns) <= set(series.table):
-            raise
-        raise InputError(f"{error} Perhaps {options.source}, which has the columns of the run, is the run. Swap the two.") from None
+    columns, interval_s = simulator.alignment.columns, simulator.interval_s
+    return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), interval_s, options.coarse_start)

@@ -108,7 +108,7 @@ def read_recording(
 def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning) -> tuple[dict[str, pd.Series], str]:
     """Interpolates a run whose solver chose its steps, or wrote events between its steps, and says so; other runs stay as they are."""
     first = next(iter(raw.values()))
-    if isinstance(first.index, pd.RangeIndex) or cleaning.interval_s is not None or not isinstance(first.index, pd.DatetimeIndex):
+    if cleaning.interval_s is not None or not isinstance(first.index, pd.DatetimeIndex):
         return dict(raw), ""
     times = np.unique(first.index.dropna().as_unit("ns").asi8)
     if len(times) < 3:

@@ -489,7 +489,7 @@ WRONG = {
     ),
     "telemetry and run swapped": (
         ["score", "RUNS/models", "RUNS/run.csv", "--column", "volts", "--coarse", "RUNS/new.csv", "--out", "x.csv"],
-        "Swap the two.",
+        "Expected a channel of new.csv: celsius. Received: 'volts'.",
     ),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
     "update where a simulator is": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/models"], "--replace"),
