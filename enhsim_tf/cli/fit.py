@@ -83,7 +83,7 @@ def fit_channels(
 
     Raises:
         InputError: Before any fit, if a channel's name cannot be used for a folder or an output folder contains something other
-            than a saved simulator. Also if the engine is not available or a simulator cannot be written.
+            than a saved simulator. Also if the engine is not available.
     """
     out = Path(os.path.abspath(options.out))
     if (out / MANIFEST).is_file():
@@ -99,13 +99,13 @@ def fit_channels(
     work = functools.partial(fit_or_say, out=out, options=options, read_run=read_run, commands=commands)
     in_this_process = options.workers == 0 or (len(groups) == 1 and options.engine == "local")
     try:
-        remove_leftovers(make_folder(out))
+        make_folder(out)
         for outcome in map(work, groups) if in_this_process else _fitted_by_processes(work, groups, options.engine, options.workers):
             reports, failed = reports | outcome.reports, failed | outcome.failed
             for line in outcome.lines:
                 say(line)
     finally:
-        remove_leftovers(out)  # temporary files of workers that were killed
+        remove_leftovers(out)  # temporary files of workers that were killed, also of an earlier run
         with contextlib.suppress(OSError):
             for folder in new_folders:
                 folder.rmdir()  # only if it is empty, because nothing was fitted

@@ -124,5 +124,5 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
         raise InputError(
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."
         )
-    columns, interval_s = simulator.alignment.columns, simulator.interval_s
-    return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), interval_s, options.coarse_start)
+    given = options.coarse, simulator.alignment.columns, options.coarse_time
+    return read_recording(*given, cleaning.of_run(), simulator.interval_s, options.coarse_start)

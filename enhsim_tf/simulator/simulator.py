@@ -367,9 +367,7 @@ class EnhancedSimulator:
         try:
             return cls(**{name: unpacked(settings[name], arrays) for name in _SAVED}, trained=settings["trained"])
         except READ_ERRORS as error:
-            raise InputError(
-                f"Expected the parts of a simulator. Received: {folder} ({short_reason(error)}). Fit it again with this version."
-            ) from None
+            raise InputError(f"Expected the parts of a simulator. Received: {folder} ({short_reason(error)}). Fit it again.") from None
 
 
 def _changed_events(changed: np.ndarray, events: Sequence[tuple[Degraded, int, int]]) -> list[tuple[str, float, int, int]]:
