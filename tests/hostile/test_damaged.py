@@ -42,7 +42,7 @@ MODELS = {
     "arrays cut off": ("arrays.npz", half, "missing or damaged file"),
     "settings by hand": ("settings.json", lambda content: content.replace(b"2.0", b"3.0"), "missing or damaged file"),
     "settings cut off": ("settings.json", half, "missing or damaged file"),
-    "another version": ("manifest.json", lambda content: content.replace(b"Simulator/5", b"Simulator/4"), "format 4"),
+    "another version": ("manifest.json", lambda content: content.replace(b"Simulator/6", b"Simulator/4"), "format 4"),
     "another program": ("manifest.json", lambda content: b'{"name": "an app"}', "KeyError in manifest.json"),
     "a list": ("manifest.json", lambda content: b"[1, 2]", "TypeError in manifest.json"),
     "manifest cut off": ("manifest.json", half, "JSONDecodeError in manifest.json"),
@@ -65,7 +65,7 @@ def test_a_model_without_one_of_its_files_is_refused(model, refused, name):
 
 
 def test_a_model_with_a_part_that_this_version_does_not_know_is_refused(model, refused):
-    rewrite(model / "settings.json", lambda content: content.replace(b"GaussianNoise", b"PinkNoise"))
+    rewrite(model / "settings.json", lambda content: content.replace(b"WindowBootstrap", b"PinkNoise"))
     sign(model)
     with refused("'PinkNoise'", "Fit it again"):
         EnhancedSimulator.load(model)
