@@ -128,8 +128,9 @@ def _add_score(commands: argparse._SubParsersAction) -> None:
         "score",
         "score telemetry with a detector that has learnt from generated telemetry",
         "Writes a score and a flag for each sample of the source. Beside SCORES it writes the alarms, one per row, to a file that ends in\n"
-        ".events.csv: begin, end, peak, duration_s, num_flagged, score and confidence. Flagged samples at most one window apart form one\n"
-        "alarm. The threshold never flags more of the nominal telemetry of the fit than it is set for.",
+        ".events.csv: begin, end, peak, duration_s, num_flagged, score, confidence, and against: what was learnt, or the new operating point\n"
+        "after a lasting departure. Flagged samples at most one window apart form one alarm. The threshold\n"
+        "never flags more of the nominal telemetry of the fit than it is set for.",
         textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
         + "\nresidual and innovation judge the difference between the telemetry and the simulator (docs/own_data.md)\n",
     )

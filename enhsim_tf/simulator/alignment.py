@@ -55,6 +55,11 @@ class Waves:
         """Names of the coarse columns: one for each channel."""
         return tuple(f"{simulator.columns[0]} of {name}" for simulator, name in zip(self.simulators, self.channels, strict=True))
 
+    @property
+    def longest_period(self) -> float:
+        """The longest period of a wave in samples; 0 if nothing is periodic."""
+        return max((each.waves[0].period_s for each in self.simulators if not each.is_constant), default=0.0) / self.interval_s
+
     def phases(self, channel: int) -> np.ndarray:
         """Coarse windows of a channel at all phases of its period, float32 of shape `(phases, samples)`."""
         period_s = max(wave.period_s for wave in self.simulators[channel].waves)

@@ -177,8 +177,7 @@ def _fit_aligned(
     step = max(1.0, (places[-1] - places[0]) / max(1, len(places) - 1))
     levels = np.stack([shift, gain], axis=2)[followed]
     simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, levels=levels, nominal=learnt, level_step=step)
-    period = max((each.waves[0].period_s for each in waves.simulators if not each.is_constant), default=0.0) / learnt.interval_s
-    notes = [_SHORT.format(window, period)] if window < period else []
+    notes = [_SHORT.format(window, waves.longest_period)] if window < waves.longest_period else []
 
     some = windows_of(learnt, random_window_starts(learnt.parts, window, number, np.random.default_rng([options.seed, 1])), window)
     clean = simulator.enhance(*waves.align(some))

@@ -36,6 +36,8 @@ _STRIDES = 8  # number of scored windows that begin within one window length
 _SERIES_VALUES = 4_000_000  # most values of such a series
 _CHUNK_VALUES = 4_000_000  # values of windows that are scored at a time
 _NOMINAL_VALUES = 2_000_000  # most values of nominal telemetry with which a threshold is set
+LEARNT, NEW = "learnt", "new operating point"
+"""What an event departs from."""
 DEFAULT = "PCA residual"
 """The detector of a simulator whose fit chose none."""
 
@@ -215,7 +217,7 @@ def score(
         "detector": scorer.name,
         "expected_false_alarm_rate": scorer.rate,
         "false_alarms_per_day": list(false_alarms_per_day(num_alarms, len(nominal) * simulator.interval_s)),
-        "events": event_rows(scores, edges, nominal, scorer.window, simulator.interval_s, departure and departure.begin),
+        "events": event_rows(scores, edges, nominal, scorer.window, simulator.interval_s, departure),
         "counts": telemetry.clock().counts,
         "departure": "",
     }
@@ -263,38 +265,51 @@ def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
 def _departure_text(frame: pd.DataFrame, departure: Departure) -> str:
     when = told_times(frame, frame.index[[departure.begin]])[0]
     when = f"{when:.10g} s" if isinstance(when, float) else when
+    moved = "." if departure.settled is not None else ", which a moved level and amplitude do not reach, so they are no events."
     return (
-        f"since {when} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a lasting fault, or "
-        "the new normal: then go on with `update`. score_after are scores against the new operating point."
+        f"1 lasting departure since {when}: the telemetry has left what was learnt and stays there ({', '.join(departure.what)}). It is a lasting "
+        f"fault, or the new normal: then go on with `update`. score_after are scores against the new operating point{moved}"
     )
 
 
 def event_rows(
-    scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: int | None = None
+    scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: Departure | None = None
 ) -> list[dict]:
     """Returns the events in plain JSON types; flags of a part within a window of each other are one event, as they share windows.
 
-    `edges` are the first samples of the parts and the number of samples; from the first sample of a departure on, all is one event.
+    `edges` are the first samples of the parts and the number of samples. From the first sample of a departure on, all is one event against what
+    was learnt, and alarms of its own scores are events against the new operating point.
     """
-    found, before = [], len(scores) if departure is None else departure
-    for first, end in itertools.pairwise(edges):
-        own = np.where(np.arange(first, end) < before, scores[first:end], np.nan)
-        found += [Event(*(int(first) + place for place in event)) for event in events_of(own > 1, own, window)]
+    end = len(scores) if departure is None else departure.begin
+    found = [(LEARNT, scores, event) for event in _events(scores, 0, end, edges, window)]
     if departure is not None:
-        found.append(Event(departure, len(scores), departure + int(np.nanargmax(scores[departure:]))))
-    peaks = [float(scores[event.peak]) for event in found]
+        found.append((LEARNT, scores, Event(end, len(scores), end + int(np.nanargmax(scores[end:])))))
+        if departure.settled is not None:
+            later = _events(departure.scores, departure.settled, len(scores), edges, window)
+            found += [(NEW, departure.scores, event) for event in later]
+    peaks = [float(own[event.peak]) for _, own, event in found]
     return [
         {
             "begin": event.begin,
             "end": event.end,
             "peak": event.peak,
             "duration_s": (event.end - event.begin) * interval_s,
-            "num_flagged": int((scores[event.begin : event.end] > 1).sum()),
+            "num_flagged": int((own[event.begin : event.end] > 1).sum()),
             "score": peak,
             "confidence": float(confidence),
+            "against": against,
         }
-        for event, peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True)
+        for (against, own, event), peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True)
     ]
+
+
+def _events(scores: np.ndarray, begin: int, end: int, edges: Sequence[int], window: int) -> list[Event]:
+    """The events of each part among the samples from `begin` to `end`."""
+    found = []
+    for first, last in itertools.pairwise(np.clip(edges, begin, end).tolist()):
+        own = scores[first:last]
+        found += [Event(*(first + place for place in event)) for event in events_of(own > 1, own, window)]
+    return found
 
 
 def told_times(frame: pd.DataFrame, index: pd.Index | None = None) -> pd.Index:
@@ -310,9 +325,10 @@ def events_table(frame: pd.DataFrame) -> pd.DataFrame:
 
     Runs of flags that are at most one window apart are one event; so is a lasting departure. The columns are `begin`, `end` and `peak` (times of
     the first flagged sample, of the sample after the last one, and of the highest score; sample numbers if the telemetry has no times),
-    `duration_s`, `num_flagged`, `score` (the highest score; the threshold is 1) and `confidence` (see `events.confidences`).
+    `duration_s`, `num_flagged`, `score` (the highest score; the threshold is 1), `confidence` (see `events.confidences`), and `against`: what was
+    `LEARNT`, or within a lasting departure the `NEW` operating point, with `num_flagged` and `score` of `score_after`.
     """
-    names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence"]
+    names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence", "against"]
     table = pd.DataFrame(frame.attrs["events"], columns=names)
     index, begin, end = frame.index, table["begin"].to_numpy(int), table["end"].to_numpy(int)
     if hasattr(index, "tz"):
