@@ -1,4 +1,4 @@
-"""Checks of the options of each command that need no data. They come before the imports of the command, which are slow."""
+"""Checks of the options of each command, and of whether their files exist. They come before the imports of the command, which are slow."""
 
 import argparse
 
@@ -7,6 +7,7 @@ from enhsim_tf.common.parallel.engines import parse_workers
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions, option_of, options_from
 from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.registry import existing
 
 _OF_RUNS = "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values"
 _NOT_OF_RUNS = "windows continuous start scenario at number timeeval nominal_share workers engine scenarios".split()
@@ -16,14 +17,23 @@ _MOST_EVENTS = 10_000
 def check(options: argparse.Namespace) -> argparse.Namespace:
     """Checks the options of a command, and replaces texts by what they say, such as `options.scenario` by a list of `Degraded`.
 
+    The folders of the simulators in MODEL_DIR become `options.folders`.
+
     Raises:
-        InputError: If a value is out of range, or options contradict each other.
+        InputError: If a value is out of range, options contradict each other, or there is no such source or simulator.
     """
     if options.seed is not None and not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
     checks = {"fit": _check_fit, "generate": _check_generate, "score": _check_score, "update": _check_update, "inject": _check_inject}
     if options.command in checks:
         checks[options.command](options)
+    for source in (getattr(options, "source", None), getattr(options, "coarse", None)):
+        if source is not None:
+            existing(source)
+    if hasattr(options, "models"):
+        from enhsim_tf.simulator.model_folder import models_of  # imports NumPy, so it comes last
+
+        options.folders = models_of(options.models)
     return options
 
 
