@@ -3,6 +3,7 @@
 import argparse
 
 from enhsim_tf.common.console import tell
+from enhsim_tf.common.errors import counted
 from enhsim_tf.datasets.folder import find_problems, read_manifest
 
 
@@ -14,5 +15,6 @@ def run_verify(options: argparse.Namespace) -> int:
         code = 2
     if not code:
         settings = read_manifest(options.folder)["settings"]
-        tell(f"{settings['windows']:,} windows in {-(-settings['windows'] // settings['shard']):,} shards, all intact")
+        shards = -(-settings["windows"] // settings["shard"])
+        tell(f"{counted(settings['windows'], 'window')} in {counted(shards, 'shard')}, all intact")
     return code

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_square
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
@@ -201,7 +201,7 @@ def score(
         judged.append((place, seen))
     if not judged:
         raise InputError(
-            f"Expected a part of at least one window of {simulator.window} samples. Received: {max(map(len, telemetry.parts))} samples. "
+            f"Expected a part of at least one window of {simulator.window} samples. Received: {counted(max(map(len, telemetry.parts)), 'sample')}. "
             "Give more telemetry."
         )
     single = len(simulator.channels) == 1
@@ -330,12 +330,9 @@ def events_table(frame: pd.DataFrame) -> pd.DataFrame:
     """
     names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence", "against"]
     table = pd.DataFrame(frame.attrs["events"], columns=names)
-    index, begin, end = frame.index, table["begin"].to_numpy(int), table["end"].to_numpy(int)
-    if hasattr(index, "tz"):
-        after = index[begin] + pd.to_timedelta(table["duration_s"].to_numpy(float), unit="s").round("us")
-    else:
-        after = index[end - 1] + 1
-    places = {"begin": index[begin], "end": after, "peak": index[table["peak"].to_numpy(int)]}
+    index, (begin, end, peak) = frame.index, table[["begin", "end", "peak"]].to_numpy(int).T
+    step = pd.to_timedelta(table["duration_s"].to_numpy(float) / (end - begin), unit="s").round("us") if hasattr(index, "tz") else 1
+    places = {"begin": index[begin], "end": index[end - 1] + step, "peak": index[peak]}
     return table.assign(**{name: told_times(frame, place) for name, place in places.items()})
 
 

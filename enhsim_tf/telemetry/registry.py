@@ -23,18 +23,11 @@ def existing(source: str | os.PathLike | Sequence[str | os.PathLike]) -> str | P
         source = os.fspath(source)
         if source.startswith("influxdb://"):
             return source
-        if not _is_there(Path(source)):
+        if not os.path.exists(source):  # unlike Path.exists, this does not raise for names that no file can have
             raise InputError(f"Expected a source of telemetry. Received: {source}, which does not exist. Give {SOURCES}.")
         return Path(source)
     paths = [Path(os.fspath(each)) for each in source]
-    wrong = next((path for path in paths if path.suffix.lower() not in TABLES or not _is_there(path)), None)
+    wrong = next((path for path in paths if path.suffix.lower() not in TABLES or not os.path.exists(path)), None)
     if wrong is not None or not paths:
         raise InputError(f"Expected tables that exist, as several sources are files of one table. Received: {wrong}. Give one source.")
     return paths
-
-
-def _is_there(path: Path) -> bool:
-    try:
-        return path.exists()
-    except (OSError, ValueError):  # a name that the file system does not allow
-        return False

@@ -89,6 +89,15 @@ def test_a_pure_shift_of_the_level_keeps_the_promise_of_the_threshold(single):
     assert sum(row["num_flagged"] for row in events if row["begin"] >= 10_000) == later.sum()
 
 
+def test_an_event_across_a_gap_ends_one_interval_after_its_last_sample():
+    seconds = np.array([0, 10, 20, 500, 510])
+    frame = pd.DataFrame(index=pd.to_datetime(seconds, unit="s", utc=True))
+    (row,) = event_rows(np.array([0.5, 2.0, 2.0, 2.0, 2.0]), [0, 3, 5], np.full(40, 0.9), 1, 10.0, Departure(1, ("level",), None, None))
+    frame.attrs = {"counts": False, "events": [row]}
+    table = events_table(frame)
+    assert (table["end"][0], table["begin"][0]) == (pd.Timestamp(520, unit="s", tz="UTC"), pd.Timestamp(10, unit="s", tz="UTC"))
+
+
 def test_times_of_a_clock_from_zero_are_written_as_seconds(single, telemetry, tmp_path):
     values = changed(telemetry, 1_500, 3_000, 6.0)
     frame = score(single[0], dataclasses.replace(values, start="1970-01-01T00:00:00+00:00"))

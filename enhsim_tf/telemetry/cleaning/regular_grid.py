@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
 from enhsim_tf.telemetry.windows import runs_of
@@ -272,12 +272,12 @@ def _build_parts(
     _log_jitter(rows, off, interval, log)
     for kind, found, text in (
         ("averaged", merged, f"rows that share an interval with another row, of which the {same_place} was taken: {{count}}"),
-        ("short parts", short, f"rows in parts of fewer than {options.min_part:,} samples ({len(short):,} such parts): {{count}}"),
+        ("short parts", short, f"rows in parts of fewer than {options.min_part:,} samples ({counted(len(short), 'such part')}): {{count}}"),
     ):
         numbers = np.concatenate([*found, rows.source_row[:0]])
         log.add(kind, numbers, text, rows_left_out=len(numbers))
     how = "filled with the value before them," if holds else "filled by straight lines with"
-    text = f"gaps of up to {options.longest_gap} samples, {how} {num_filled:,} samples in total: {{count}}"
+    text = f"gaps of up to {counted(options.longest_gap, 'sample')}, {how} {counted(num_filled, 'sample')} in total: {{count}}"
     log.add("gaps filled", np.concatenate(gaps), text, samples_filled=num_filled)
     return parts, used
 
@@ -288,7 +288,7 @@ def _log_breaks(rows: Rows, segments: Sequence[_Segment], interval: float, log: 
     is_gap = np.round(steps) > max_fill + 1
     unit = 1.0 if log.times is None else interval / 1e9
     longest, what = steps.max(initial=0) * unit, "samples" if log.times is None else "s"
-    text = f"gaps of more than {max_fill} samples, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
+    text = f"gaps of more than {counted(max_fill, 'sample')}, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
     log.add("gaps", rows.source_row[before[is_gap]], text, details={"longest": float(longest)})
     log.add("clock steps", rows.source_row[before[~is_gap]], "jumps of the clock, at which the series is split: {count}")
 
