@@ -17,8 +17,6 @@ _MOST_EVENTS = 10_000
 def check(options: argparse.Namespace) -> argparse.Namespace:
     """Checks the options of a command, and replaces texts by what they say, such as `options.scenario` by a list of `Degraded`.
 
-    The folders of the simulators in MODEL_DIR become `options.folders`.
-
     Raises:
         InputError: If a value is out of range, options contradict each other, or there is no such source or simulator.
     """
@@ -33,7 +31,7 @@ def check(options: argparse.Namespace) -> argparse.Namespace:
     if hasattr(options, "models"):
         from enhsim_tf.simulator.model_folder import models_of  # imports NumPy, so it comes last
 
-        options.folders = models_of(options.models)
+        models_of(options.models)
     return options
 
 

@@ -16,7 +16,7 @@ from enhsim_tf.datasets.labelled_windows import draw_schedule, series_index, ser
 from enhsim_tf.datasets.mix import make_mix, read_mix
 from enhsim_tf.datasets.places import length_limits, parse_num_samples
 from enhsim_tf.datasets.plan import Plan, make_plan
-from enhsim_tf.simulator.model_folder import chosen_of, folder_of
+from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
 from enhsim_tf.telemetry.placing import PlacedEvent
@@ -30,7 +30,7 @@ def run_generate(options: argparse.Namespace) -> int:
         for out, plan in _plans_of(options).items():  # all plans are checked before the first one is made
             generate_data_set(out, plan, options.workers, options.engine or "local", tell)
         return 0
-    is_series, models = options.continuous is not None, chosen_of(options.folders, options.channel)
+    is_series, models = options.continuous is not None, chosen_of(models_of(options.models), options.channel)
     suffixes = (".csv",) if options.timeeval else (".parquet", ".csv") if is_series else (".parquet",)
     paths, write = output_paths(options.out, models, suffixes), _write_series if is_series else _write_windows
 
@@ -79,7 +79,7 @@ def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, pat
 def _generate_copies(options: argparse.Namespace) -> int:
     """Generates copies of a recorded run of the user's own simulator with each model."""
     copies = 1 if options.copies is None else options.copies
-    models = chosen_of(options.folders, options.channel)
+    models = chosen_of(models_of(options.models), options.channel)
     paths = output_paths(options.out, models, (".parquet",))
     refuse_same_file(paths.values(), options.coarse)
 
@@ -104,6 +104,6 @@ def _plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
     seed, num_windows = (given if given is not None else kept for given, kept in ((options.seed, mix.seed), (options.windows, mix.windows)))
     if num_windows is None:
         raise InputError(f"Expected a number of windows. Received: none in {options.scenarios}. Give --windows.")
-    models = chosen_of(options.folders, options.channel)
+    models = chosen_of(models_of(options.models), options.channel)
     outs = {name: options.out if len(models) == 1 else folder_of(options.out, name) for name in models}
     return {outs[name]: make_plan(mix, folder, seed or 0, num_windows) for name, folder in models.items()}

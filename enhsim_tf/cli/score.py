@@ -16,6 +16,7 @@ from enhsim_tf.cli.options import (
 )
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import counted, printable, spoken
+from enhsim_tf.simulator.model_folder import models_of
 from enhsim_tf.simulator.scoring import NEW, events_path, events_table, score, write_scores
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.report import lines_of
@@ -24,7 +25,7 @@ from enhsim_tf.telemetry.sources import read_source
 
 def run_score(options: argparse.Namespace) -> int:
     """Scores the channels of the source with their simulators and returns the exit code."""
-    models, cleaning = options.folders, options.cleaning
+    models, cleaning = models_of(options.models), options.cleaning
     series = read_source(options.source, options.column, options.time, cleaning)
     channels = channels_by_model(series, models)
     source_names = {model: next(iter(names.values())) if len(names) == 1 else model for model, names in channels.items()}

@@ -9,7 +9,7 @@ from enhsim_tf.cli.options import channels_by_model, cleaned_channels, for_each,
 from enhsim_tf.common.atomic_files import replace_folder, write_json
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, refuse_foreign
+from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, models_of, refuse_foreign
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.updating import update
 from enhsim_tf.telemetry.cleaning.report import lines_of
@@ -18,7 +18,7 @@ from enhsim_tf.telemetry.sources import read_source
 
 def run_update(options: argparse.Namespace) -> int:
     """Updates the simulators of the channels of the source and returns the exit code."""
-    models, cleaning = options.folders, options.cleaning
+    models, cleaning = models_of(options.models), options.cleaning
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
     series = read_source(options.source, options.column, options.time, cleaning)
     channels = channels_by_model(series, models)
