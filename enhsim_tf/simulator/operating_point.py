@@ -29,7 +29,7 @@ class Departure(NamedTuple):
     """A lasting departure from what was learnt: its first sample, and what differs, as `changed_properties` names it.
 
     From there on, `scores` are those of the telemetry moved back to the nominal level and amplitude. From the sample `settled` on, those above 1
-    are alarms against the new operating point; None if most are, because more has changed than level and amplitude.
+    are alarms against the new operating point; None if too many are at once, because more has changed than level and amplitude.
     """
 
     begin: int
