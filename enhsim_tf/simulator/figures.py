@@ -103,6 +103,9 @@ def score_figure(frame: pd.DataFrame, simulator: EnhancedSimulator, name: str) -
         if enhanced in frame:
             sheet.curve(axes, frame[enhanced], ENHANCED, 1.0)
             title_words(axes, [("telemetry", REAL), ("enhanced run", ENHANCED)] if axes is sheet.axes[0] else [])
+    if "score_after" in frame:
+        sheet.curve(last, frame["score_after"], ENHANCED, 0.7)
+        title_words(last, [("against what was learnt", REAL), ("against the new operating point", ENHANCED)])
     sheet.curve(last, frame["score"], REAL, 0.7)
     last.axhline(1, color=QUIET, linewidth=0.8, linestyle=DASHED)
     if np.nanmax(frame["score"].to_numpy(), initial=0.0) > 20:
