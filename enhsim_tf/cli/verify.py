@@ -3,7 +3,7 @@
 import argparse
 
 from enhsim_tf.common.console import tell
-from enhsim_tf.datasets.folder import find_problems, read_manifest
+from enhsim_tf.datasets.folder import find_problems, num_shards, read_manifest
 
 
 def run_verify(options: argparse.Namespace) -> int:
@@ -14,5 +14,5 @@ def run_verify(options: argparse.Namespace) -> int:
         code = 2
     if not code:
         settings = read_manifest(options.folder)["settings"]
-        tell(f"{settings['windows']:,} windows in {-(-settings['windows'] // settings['shard']):,} shards, all intact")
+        tell(f"{settings['windows']:,} windows in {num_shards(settings):,} shards, all intact")
     return code

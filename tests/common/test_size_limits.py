@@ -106,14 +106,10 @@ def test_a_pipe_is_refused_without_blocking(tmp_path):
         read_json(tmp_path / "x.json", 100)
 
 
-YAML = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"{b}: &{b} [{', '.join(9 * [f'*{a}'])}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
-)
 MANIFEST = '{"format": "enhsim_tf.datasets.generate/2", "settings": {"windows": 1000000000, "shard": 1, "window": 1, "interval_s": 1.0, "models": []}'
 BOMBS = {
     "npy": lambda path: npy(path, "<f8", (10**12,), bytes(80)),
     "parquet": lambda path: pq.write_table(repeated(1_000_000, "long " * 20_000), path, compression="zstd", store_schema=False),  # 100 GB
-    "yaml": lambda path: path.write_text(YAML),
     "_manifest.json": lambda path: path.write_text(MANIFEST + ', "shards": [' + "{}," * 300_000 + "{}]}"),
 }
 READS = """
@@ -121,13 +117,12 @@ import resource, sys
 from pathlib import Path
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
-from enhsim_tf.datasets.mix import read_mix
 from enhsim_tf.datasets.folder import find_problems
-import pyarrow.parquet, pandas, yaml
+import pyarrow.parquet, pandas
 path = Path(sys.argv[1])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 try:
-    {"json": lambda: list(find_problems(path.parent)), "yaml": lambda: read_mix(path)}.get(path.suffix[1:], lambda: read_source(path))()
+    list(find_problems(path.parent)) if path.suffix == ".json" else read_source(path)
 except InputError as error:
     print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024, error)
 """

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enhsim_tf.datasets.folder import MANIFEST, check_folder, find_problems, read_manifest, read_records
-from enhsim_tf.datasets.mix import Mix
+from enhsim_tf.datasets.folder import MANIFEST, check_folder, find_problems, read_manifest
 from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.datasets.shard import shard_file
+from enhsim_tf.datasets.shard import finished_shards, shard_file
 from enhsim_tf.simulator.model_folder import models_of, refuse_foreign
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from tests.fuzzing.readers import all_of, changed, changed_json, judge, tried
@@ -22,8 +21,7 @@ def read_model(file, data, folder):
     all_of(
         lambda: models_of(folder / "models"),
         lambda: refuse_foreign(model),
-        lambda: make_plan(Mix(), model, 0, 100),
-        lambda: EnhancedSimulator.load(model),
+        lambda: make_plan(EnhancedSimulator.load(model), model, (), 1.0, 100, 0),
     )
 
 
@@ -52,9 +50,8 @@ def test_arrays_of_models(data):
 def read_data_set(files, folder):
     made = write_data_set(folder / "set", **files)
     lines = []
-    all_of(
-        lambda: read_manifest(made), lambda: read_records(made), lambda: check_folder(made, PLAN), lambda: lines.extend(find_problems(made))
-    )
+    all_of(lambda: read_manifest(made), lambda: check_folder(made, PLAN), lambda: lines.extend(find_problems(made)))
+    assert len(list(finished_shards(made, PLAN))) in (1, 2)
     assert all(line.isprintable() for line in lines)
 
 
@@ -64,19 +61,9 @@ def test_manifests_of_data_sets(data):
     judge(read_data_set, {"manifest": data})
 
 
-RECORDS = [json.dumps([number, each["rows"], each["sha256"]]) for number, each in enumerate(json.loads(data_set()[MANIFEST])["shards"])]
-
-
-@tried(60)
-@given(changed(["\n".join(RECORDS).encode(), RECORDS[0].encode()]) | st.binary(max_size=300))
-def test_journals_of_data_sets(data):
-    unfinished = json.loads(data_set()[MANIFEST]) | {"shards": None}
-    judge(read_data_set, {"manifest": json.dumps(unfinished).encode(), "journal": data})
-
-
 @tried(60)
 @given(changed([data_set()[shard_file(0)]]))
 def test_shards_of_data_sets(data):
     manifest = json.loads(data_set()[MANIFEST])
-    manifest["shards"][0]["sha256"] = hashlib.sha256(data).hexdigest()
+    manifest["shards"][shard_file(0)] = hashlib.sha256(data).hexdigest()
     judge(read_data_set, {"manifest": json.dumps(manifest).encode(), "shard": data})

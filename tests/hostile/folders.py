@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.datasets.folder import JOURNAL, MANIFEST
-from enhsim_tf.datasets.mix import Mix, ScenarioShare
+from enhsim_tf.datasets.folder import MANIFEST
 from enhsim_tf.datasets.plan import FORMAT
 from enhsim_tf.datasets.shard import shard_file
 from enhsim_tf.enhancer.model import Enhancer
@@ -19,7 +18,7 @@ from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from tests.known_simulators import of_waves
 from tests.small_data_set import PlainMaker, plan
 
-PLAN = plan(20, 10, mix=Mix(0.5, (ScenarioShare("stuck", 0.5, (0.2, 0.9), (0.0, 0.5)),)))
+PLAN = plan(20, 10)
 
 
 @functools.cache
@@ -81,15 +80,14 @@ def write_model(folder: Path, **changed: bytes) -> Path:
 def data_set() -> dict[str, bytes]:
     """The files of a small finished data set."""
     with tempfile.TemporaryDirectory() as folder:
-        records = [PlainMaker(PLAN, folder)(number) for number in range(2)]
+        shards = {shard_file(number): PlainMaker(PLAN, folder)(number)[1] for number in range(2)}
         files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
-    shards = [{"file": shard_file(each.shard), "rows": each.rows, "sha256": each.sha256} for each in records]
     return files | {MANIFEST: json.dumps({"format": FORMAT, "settings": PLAN.settings(), "shards": shards}).encode()}
 
 
 def write_data_set(folder: Path, **changed: bytes) -> Path:
-    """Writes a finished data set with other contents of `manifest`, `journal` or `shard`, which is the first."""
-    names = {"manifest": MANIFEST, "journal": JOURNAL, "shard": shard_file(0)}
+    """Writes a finished data set with another content of `manifest` or of `shard`, which is the first."""
+    names = {"manifest": MANIFEST, "shard": shard_file(0)}
     folder.mkdir(parents=True)
     for name, content in (data_set() | {names[name]: content for name, content in changed.items()}).items():
         (folder / name).write_bytes(content)

@@ -12,7 +12,6 @@ import zipfile
 import numpy as np
 import pytest
 
-from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import make_plan
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.sources import read_source
@@ -24,7 +23,8 @@ SETTINGS = json.loads(saved_model()["settings.json"])
 
 def test_the_model_as_it_was_written_loads(tmp_path):
     model = write_model(tmp_path / "model")
-    assert EnhancedSimulator.load(model).generate(2).shape == (2, 24, 1) and make_plan(Mix(), model, 0, 5).window == 24
+    simulator = EnhancedSimulator.load(model)
+    assert simulator.generate(2).shape == (2, 24, 1) and make_plan(simulator, model, (), 1.0, 5, 0).window == 24
 
 
 class Payload:
