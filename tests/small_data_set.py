@@ -48,7 +48,7 @@ class SlowMaker(PlainMaker):
 
 def plan(num_windows=1_000, shard=50, seed=3, scenarios=SCENARIOS, nominal=0.5, checksum="0" * 64):
     nominal = nominal if scenarios else 1.0
-    return Plan(scenarios, nominal, "model", Path("nowhere"), checksum, WINDOW, INTERVAL_S, ("volts",), seed, num_windows, shard)
+    return Plan(scenarios, nominal, Path("nowhere"), checksum, WINDOW, INTERVAL_S, ("volts",), seed, num_windows, shard)
 
 
 def die_at_thirteen(number):

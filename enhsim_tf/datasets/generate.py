@@ -1,13 +1,12 @@
 """Generates large data sets with worker processes, and resumes them after an interruption.
 
-The main process assigns numbers of shards to workers and records finished shards. It neither holds windows nor loads networks.
+The main process assigns numbers of shards to workers and records the checksums of finished shards. It neither holds windows nor loads networks.
 If the folder contains a part of the same data set, finished shards are kept and the others are generated. The bytes of the result do not
 depend on the engine, the number of workers or the number of interruptions.
 """
 
 import contextlib
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -44,7 +43,6 @@ def generate_data_set(
 
 
 def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Callable[[str], None]) -> None:
-    began = time.monotonic()
     checksums: dict[int, str] = {}
     if (out / MANIFEST).exists():
         recorded = read_manifest(out)["shards"]
@@ -52,7 +50,7 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
         tell(f"{len(checksums):,} of {plan.num_shards:,} shards are there and intact; {plan.num_shards - len(checksums):,} to generate")
     else:
         write_manifest(out, plan)
-    kept, made, generated = sum(map(plan.num_windows_in, checksums)), 0, Progress(tell).loop("window", plan.num_windows)
+    done, generated = sum(map(plan.num_windows_in, checksums)), Progress(tell).loop("window", plan.num_windows)
     missing = (shard for shard in range(plan.num_shards) if shard not in checksums)
     running = engines.run(engine, ShardMaker(plan, out), missing, workers)  # starts no worker if no shard is missing
     with contextlib.closing(running):
@@ -63,8 +61,6 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
                     "elsewhere. Give an --out that all machines share."
                 )
             checksums[shard] = checksum
-            made += plan.num_windows_in(shard)
-            generated(kept + made)
+            done += plan.num_windows_in(shard)
+            generated(done)
     write_manifest(out, plan, checksums)
-    if made:
-        tell(f"{made:,} windows, {made / (time.monotonic() - began):,.0f} a second")

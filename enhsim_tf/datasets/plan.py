@@ -8,7 +8,6 @@ import hashlib
 import importlib.metadata
 import json
 import os
-import urllib.parse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -34,7 +33,6 @@ class Plan:
 
     scenarios: tuple[ScenarioRange, ...]  # with equal shares of the windows that are not nominal
     nominal_share: float
-    name: str
     folder: Path  # the content of the windows does not depend on it
     sha256: str  # of the manifest of the model, which contains the checksums of its files
     window: int
@@ -78,7 +76,7 @@ class Plan:
             "channels": self.channels,
             "nominal": self.nominal_share,
             "scenarios": [dataclasses.asdict(scenario) for scenario in self.scenarios],
-            "model": {"name": self.name, "sha256": self.sha256},
+            "model": self.sha256,
             "versions": {name: importlib.metadata.version(name) for name in _VERSIONS},
         }
         return json.loads(json.dumps(settings))
@@ -106,7 +104,6 @@ def make_plan(
     return Plan(
         tuple(scenarios),
         nominal_share if scenarios else 1.0,
-        urllib.parse.unquote(folder.name),
         folder,
         sha256(folder / MANIFEST),
         window,

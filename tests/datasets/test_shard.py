@@ -121,7 +121,7 @@ def planned(simulator, folder, *scenarios, nominal=0.5, windows=20_000, seed=1):
 
 def test_a_plan_holds_what_its_model_says_and_no_path(tmp_path):
     made = planned(plain(), tmp_path / "volts")
-    assert (made.window, made.interval_s, made.name, made.nominal_share) == (60, 2.0, "volts", 1.0)
+    assert (made.window, made.interval_s, made.channels, made.nominal_share) == (60, 2.0, ("volts",), 1.0)
     assert (made.shard, made.num_shards, made.num_windows_in(2)) == (8_000, 3, 4_000)
     assert str(tmp_path) not in json.dumps(made.settings())
 

@@ -89,7 +89,7 @@ def test_what_is_not_finite_is_neither_generated_nor_scored_nor_saved(kind, whic
         lambda: simulator.generate(3),
         lambda: simulator.generate_series(200),
         lambda: score(simulator, telemetry, run, ScoreOptions(num_windows=20)),
-        lambda: write_windows(tmp_path / "x.parquet", Plan((), 1.0, "volts", tmp_path, "", 64, 1.0, ("volts",), 0, 5, 5), simulator),
+        lambda: write_windows(tmp_path / "x.parquet", Plan((), 1.0, tmp_path, "", 64, 1.0, ("volts",), 0, 5, 5), simulator),
     ]
     for use in uses if kind == "waves" else [*uses, lambda: list(simulator.generate_copies(RUN, 1))]:
         with refused("finite", "Fit it again"):
