@@ -36,7 +36,7 @@ _PLACES = {
     "read_source": "telemetry.sources",
     "record": "coarse_simulator.recording",
     "score": "simulator.scoring",
-    "series_labelled": "datasets.labelled_windows",
+    "series_labelled": "datasets.labelled_series",
     "to_series": "telemetry.pandas_series",
     "update": "simulator.updating",
 }

@@ -95,7 +95,9 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
     how_many.add_argument("--windows", type=int, metavar="N", help="total number of windows")
     how_many.add_argument("--continuous", metavar="LENGTH", help="length of one continuous series, such as 1d, 6h, 90min or 5000 (samples)")
     generate.add_argument("--start", metavar="TIME", help="start of the series, such as 2024-01-01 (default: times are seconds from 0)")
-    what = "a degraded mode, such as stuck:0.5, of all channels or of one"
+    what = (
+        "a degraded mode, such as stuck:0.5, of all channels or of one; for ranges such as stuck:0.2-0.8:0.1-0.9, each window draws its own"
+    )
     _add_repeated(generate, "--scenario", what, "[CHANNEL=]MODE:SEVERITY[:ONSET]", [])
     series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
     series.add_argument("--number", type=int, metavar="N", help="number of events at random places; the scenarios are used in turn")
@@ -108,12 +110,9 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
     _add_coarse(coarse)
     coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with different noise (default: 1)")
     _add_cleaning(coarse)
-    large = generate.add_argument_group(
-        "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
-    )
+    large = generate.add_argument_group("large data sets", "with these options, OUT is a folder of many files (docs/large_data_sets.md)")
     _add_workers(large, "number of worker processes", None)
-    large.add_argument("--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios")
-    _add_seed(generate, None)  # None shows that the option was not given: a scenario file may contain the seed
+    _add_seed(generate)
 
 
 def _add_verify(commands: argparse._SubParsersAction) -> None:
@@ -201,8 +200,8 @@ def _add_json(parser: _Parser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object in place of lines of text")
 
 
-def _add_seed(parser: _Parser, default: int | None = 0) -> None:
-    parser.add_argument("--seed", type=int, default=default, help="random seed (default: 0)")
+def _add_seed(parser: _Parser) -> None:
+    parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
 
 
 def _add_workers(parser: _Parser, text: str, engine: str | None = "local") -> None:

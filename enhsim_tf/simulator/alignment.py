@@ -124,24 +124,28 @@ class Waves:
                 rows_of.setdefault(scenario, []).append(row)
         nominal = np.concatenate([self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2)
         changes = [(channel, rows, scenario, 0, self.window) for scenario, rows in rows_of.items() for channel in self._concerned(scenario)]
-        return self._degraded(nominal, self._times(starts), changes, rng) if changes else Drawn(nominal, nominal)
+        return self._degraded(nominal, starts, changes, rng) if changes else Drawn(nominal, nominal)
 
     def draw_series(self, num_samples: int, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
         """Simulates one coarse series, as a single window of `num_samples`; each event is a mode, its first sample and its end."""
         times, numbers = (self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
         nominal = np.stack([self._in_unit(channel, self.simulators[channel].simulate(times)) for channel in numbers], axis=2)
         changes = [(channel, [0], *event) for channel in numbers for event in events if channel in self._concerned(event[0])]
-        return self._degraded(nominal, times, changes, rng)
+        return self._degraded(nominal, np.zeros(1, int), changes, rng)
 
     def _degraded(
-        self, nominal: np.ndarray, times: np.ndarray, changes: Sequence[tuple[int, list[int], Degraded, int, int]], rng: np.random.Generator
+        self,
+        nominal: np.ndarray,
+        starts: np.ndarray,
+        changes: Sequence[tuple[int, list[int], Degraded, int, int]],
+        rng: np.random.Generator,
     ) -> Drawn:
         """Puts degraded modes into coarse windows; each change is a channel, its windows, the mode, its first sample and its end."""
         coarse, is_stuck = nominal.copy(), False
         held = np.broadcast_to(np.arange(nominal.shape[1])[:, None], nominal.shape).copy()
         for channel, rows, scenario, begin, end in changes:
-            values = self.simulators[channel].simulate(times[rows, begin:end], scenario, rng)
-            coarse[rows, begin:end, channel] = self._in_unit(channel, values)
+            times = self.interval_s * (starts[rows][:, None] + np.arange(begin, end))
+            coarse[rows, begin:end, channel] = self._in_unit(channel, self.simulators[channel].simulate(times, scenario, rng))
             stuck = held_samples(scenario, end - begin)
             if stuck is not None:
                 held[rows, begin + stuck[0] : begin + stuck[1], channel], is_stuck = begin + stuck[0], True

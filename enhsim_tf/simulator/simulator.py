@@ -186,48 +186,57 @@ class EnhancedSimulator:
         Raises:
             InputError: If `num_windows` is negative or not a whole number, or a scenario cannot be applied.
         """
-        return self._joined(num_windows, self.generate_labelled_chunks(num_windows, scenario, seed))
+        return self._joined(num_windows, scenario, seed)
 
     def generate_clean(self, num_windows: int, seed: int = 0) -> np.ndarray:
         """Returns the nominal windows of `generate` before noise is added."""
-        return self._joined(num_windows, self.generate_labelled_chunks(num_windows, None, seed, with_noise=False))
+        return self._joined(num_windows, None, seed, with_noise=False)
 
     def generate_labelled_chunks(
-        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0, with_noise: bool = True
+        self, scenarios: Sequence[Degraded | None], seed: int = 0, with_noise: bool = True
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yields the windows of `generate` in chunks, each with a mask of the samples that the scenario has changed.
+        """Yields windows as those of `generate`, one for each scenario, in chunks, with a mask of the samples that the scenario has changed.
 
         Memory does not grow with the number of windows. A sample that is not marked equals that of the same seed without a scenario.
         """
         rng, noise_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1]) if with_noise else None
+        num_windows = len(scenarios)
         starts = rng.integers(0, START_RANGE, num_windows)
         rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
         chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
         for first in range(0, num_windows, chunk):
             some = slice(first, first + chunk)
-            drawn = self.alignment.draw(starts[some], [scenario] * len(starts[some]), rng)
-            yield self.complete(drawn, None if self.levels is None else self.levels[rows[some]], noise_rng)
+            drawn = self.alignment.draw(starts[some], scenarios[some], rng)
+            degraded = [row for row, scenario in enumerate(scenarios[some]) if scenario is not None]
+            yield self._complete(drawn, degraded, None if self.levels is None else self.levels[rows[some]], noise_rng)
 
-    def _joined(self, num_windows: int, chunks: Iterator[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    def _joined(self, num_windows: int, scenario: Degraded | None, seed: int, with_noise: bool = True) -> np.ndarray:
         _check_count("num_windows", num_windows, 0)
         windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
-        for chunk, _ in chunks:
+        for chunk, _ in self.generate_labelled_chunks([scenario] * num_windows, seed, with_noise):
             windows[filled : filled + len(chunk)] = chunk
             filled += len(chunk)
         return windows
 
-    def complete(self, drawn: Drawn, levels: np.ndarray | None, noise_rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
+    def _complete(
+        self, drawn: Drawn, degraded: list[int], levels: np.ndarray | None, noise_rng: np.random.Generator | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Completes coarse windows to telemetry; returns float32 windows, and a mask of the samples that a degraded mode has changed.
 
-        `levels` are offset and gain of each window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the
-        nominal signal, so samples that are not marked equal the nominal ones to the bit.
+        `degraded` are the numbers of the windows with a degraded mode; the others are enhanced once. `levels` are offset and gain of each
+        window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the nominal signal, so samples that are
+        not marked equal the nominal ones to the bit.
         """
-        shift, gain = (None, None) if levels is None else (levels[..., 0], levels[..., 1])
-        clean = self.enhance(drawn.nominal, shift, gain)
-        windows, mask = clean, np.zeros(clean.shape, bool)
-        if drawn.coarse is not drawn.nominal:
-            degraded = self.enhance(drawn.coarse, shift, gain)
-            windows, mask = put_changes(clean, degraded, drawn, [(0, self.window)], fade_length(self.window), self._tolerance)
+
+        def enhanced(coarse: np.ndarray, rows: slice | list[int]) -> np.ndarray:
+            return self.enhance(coarse[rows], *(() if levels is None else (levels[rows, :, 0], levels[rows, :, 1])))
+
+        clean = windows = enhanced(drawn.nominal, slice(None))
+        mask = np.zeros(clean.shape, bool)
+        if degraded:
+            windows, some = clean.copy(), Drawn(*(None if each is None else each[degraded] for each in drawn))
+            changed, fade = enhanced(drawn.coarse, degraded), fade_length(self.window)
+            windows[degraded], mask[degraded] = put_changes(clean[degraded], changed, some, [(0, self.window)], fade, self._tolerance)
         return (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
 
     @property

@@ -9,9 +9,8 @@ import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import Plan
-from enhsim_tf.datasets.shard import make_windows
+from enhsim_tf.datasets.shard import write_windows
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.joint import join_channels
@@ -91,7 +90,7 @@ def test_what_is_not_finite_is_neither_generated_nor_scored(kind, which, of_run,
         lambda: simulator.generate(3),
         lambda: simulator.generate_series(200),
         lambda: score(simulator, telemetry, run, ScoreOptions(num_windows=20)),
-        lambda: make_windows(Plan(Mix(), "volts", tmp_path, "", 64, 1.0, ("volts",), 0, 5, 5), simulator, 0),
+        lambda: write_windows(tmp_path / "x.parquet", Plan((), 1.0, tmp_path, "", 64, 1.0, ("volts",), 0, 5, 5), simulator),
     ]
     for use in uses if kind == "waves" else [*uses, lambda: list(simulator.generate_copies(RUN, 1))]:
         with refused("finite", "Fit it again"):
