@@ -8,8 +8,8 @@ import numpy as np
 from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.backend import tf
-from enhsim_tf.datasets.labelled_windows import write_windows_labelled
-from enhsim_tf.datasets.places import Share
+from enhsim_tf.datasets.plan import make_plan
+from enhsim_tf.datasets.shard import write_windows
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
@@ -75,7 +75,9 @@ def generate(num_windows: int) -> Work:
 def generate_to_parquet(num_windows: int) -> Work:
     """Prepares the writing of labelled windows to a Parquet file in a temporary folder."""
     made, folder = simulator(), tempfile.TemporaryDirectory()
-    return lambda: write_windows_labelled(os.path.join(folder.name, "windows.parquet"), made, [Share(None, num_windows, 0)]), num_windows
+    made.save(os.path.join(folder.name, "model"))
+    plan = make_plan(made, os.path.join(folder.name, "model"), (), 1.0, num_windows, seed=0)
+    return lambda: write_windows(os.path.join(folder.name, "windows.parquet"), plan, made), num_windows
 
 
 def matrix_product() -> Work:

@@ -88,7 +88,7 @@ def run_autoregression(coefficients, variance, num_windows, rng):
     return lfilter([1.0], np.concatenate([[1.0], -coefficients]), steps, axis=1)[:, 1_000:]
 
 
-from enhsim_tf.noise.surrogates import GaussianAutoregression
+from studies.common.gaussian_noise import GaussianAutoregression
 
 example = run_autoregression(np.array([0.9, -0.5]), 1.0, 300, np.random.default_rng(0))
 mine, theirs = fit_autoregression(example, 20)[0], GaussianAutoregression.fit(example, 20).coefficients

@@ -6,7 +6,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.alignment import Waves
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 
@@ -41,7 +41,7 @@ def of_waves(
     given = {
         "alignment": Waves(waves, channels, interval_s, window),
         "enhancer": unchanged(window, len(waves)),
-        "noise": GaussianNoise(noise_sd * np.eye(len(waves)), window),
+        "noise": WindowBootstrap(noise_sd * np.random.default_rng(9).standard_normal((500, window, len(waves)))),
         "levels": np.array([[level_offset_and_scale(each) for each in waves]]),
         "trained": {"seed": 0},
     }

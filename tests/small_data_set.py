@@ -16,14 +16,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate  # noqa: E402
-from enhsim_tf.datasets.mix import Mix, ScenarioShare  # noqa: E402
+from enhsim_tf.datasets.places import ScenarioRange  # noqa: E402
 from enhsim_tf.datasets.plan import Plan  # noqa: E402
 from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
 from tests.known_simulators import of_waves  # noqa: E402
 
 COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
 WINDOW, INTERVAL_S = 60, 2.0
-MIX = Mix(0.5, (ScenarioShare("stuck", 0.3, (0.2, 0.9), (0.0, 0.5)), ScenarioShare("gain_loss", 0.2, (0.5, 0.5), (0.25, 0.25))))
+SCENARIOS = (ScenarioRange("stuck", (0.2, 0.9), (0.0, 0.5)), ScenarioRange("gain_loss", (0.5, 0.5)))
 
 
 def plain(noise_sd=0.1, **others):
@@ -46,8 +46,9 @@ class SlowMaker(PlainMaker):
     delay_s = 0.03
 
 
-def plan(num_windows=1_000, shard=50, seed=3, mix=MIX, checksum="0" * 64):
-    return Plan(mix, "model", Path("nowhere"), checksum, WINDOW, INTERVAL_S, ("volts",), seed, num_windows, shard)
+def plan(num_windows=1_000, shard=50, seed=3, scenarios=SCENARIOS, nominal=0.5, checksum="0" * 64):
+    nominal = nominal if scenarios else 1.0
+    return Plan(scenarios, nominal, Path("nowhere"), checksum, WINDOW, INTERVAL_S, ("volts",), seed, num_windows, shard)
 
 
 def die_at_thirteen(number):

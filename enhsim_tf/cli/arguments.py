@@ -95,7 +95,9 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
     how_many.add_argument("--windows", type=int, metavar="N", help="total number of windows")
     how_many.add_argument("--continuous", metavar="LENGTH", help="length of one continuous series, such as 1d, 6h, 90min or 5000 (samples)")
     generate.add_argument("--start", metavar="TIME", help="start of the series, such as 2024-01-01 (default: times are seconds from 0)")
-    what = "a degraded mode, such as stuck:0.5, of all channels or of one"
+    what = (
+        "a degraded mode, such as stuck:0.5, of all channels or of one; for ranges such as stuck:0.2-0.8:0.1-0.9, each window draws its own"
+    )
     _add_repeated(generate, "--scenario", what, "[CHANNEL=]MODE:SEVERITY[:ONSET]", [])
     series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
     series.add_argument("--number", type=int, metavar="N", help="number of events at random places; the scenarios are used in turn")
@@ -108,12 +110,9 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
     _add_coarse(coarse)
     coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with different noise (default: 1)")
     _add_cleaning(coarse)
-    large = generate.add_argument_group(
-        "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
-    )
+    large = generate.add_argument_group("large data sets", "with these options, OUT is a folder of many files (docs/large_data_sets.md)")
     _add_workers(large, "number of worker processes", None)
-    large.add_argument("--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios")
-    _add_seed(generate, None)  # None shows that the option was not given: a scenario file may contain the seed
+    _add_seed(generate)
 
 
 def _add_verify(commands: argparse._SubParsersAction) -> None:
@@ -128,8 +127,9 @@ def _add_score(commands: argparse._SubParsersAction) -> None:
         "score",
         "score telemetry with a detector that has learnt from generated telemetry",
         "Writes a score and a flag for each sample of the source. Beside SCORES it writes the alarms, one per row, to a file that ends in\n"
-        ".events.csv: begin, end, peak, duration_s, num_flagged, score and confidence. Flagged samples at most one window apart form one\n"
-        "alarm. The threshold never flags more of the nominal telemetry of the fit than it is set for.",
+        ".events.csv: begin, end, peak, duration_s, num_flagged, score, confidence, and against: what was learnt, or the new operating point\n"
+        "after a lasting departure. Flagged samples at most one window apart form one alarm. The threshold\n"
+        "never flags more of the nominal telemetry of the fit than it is set for.",
         textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
         + "\nresidual and innovation judge the difference between the telemetry and the simulator (docs/own_data.md)\n",
     )
@@ -178,10 +178,11 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
     inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at random places, or all; they are used in turn")
     inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at random places (default: one of each kind)")
     severity = "severity in standard deviations of the noise, or a range (default: 4)"
-    inject.add_argument("--severity", default="4", metavar="SD[:SD]", help=severity)
+    inject.add_argument("--severity", metavar="SD[:SD]", help=severity)
     noise = "standard deviation of the noise (default: estimated from second differences)"
     inject.add_argument("--noise-sd", type=float, metavar="SD", help=noise)
     _add_events(inject, "anomaly", "KIND", "ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h")
+    inject.add_argument("--figure", action="store_true", help="draw the changed channels, with the anomalies, beside OUT, as .png")
     inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(inject)
 
@@ -199,8 +200,8 @@ def _add_json(parser: _Parser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object in place of lines of text")
 
 
-def _add_seed(parser: _Parser, default: int | None = 0) -> None:
-    parser.add_argument("--seed", type=int, default=default, help="random seed (default: 0)")
+def _add_seed(parser: _Parser) -> None:
+    parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
 
 
 def _add_workers(parser: _Parser, text: str, engine: str | None = "local") -> None:

@@ -1,4 +1,4 @@
-"""Checks of the options of each command that need no data. They come before the imports of the command, which are slow."""
+"""Checks of the options of each command, and of whether their files exist. They come before the imports of the command, which are slow."""
 
 import argparse
 
@@ -7,23 +7,31 @@ from enhsim_tf.common.parallel.engines import parse_workers
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions, option_of, options_from
 from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.registry import existing
 
 _OF_RUNS = "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values"
-_NOT_OF_RUNS = "windows continuous start scenario at number timeeval nominal_share workers engine scenarios".split()
+_NOT_OF_RUNS = "windows continuous start scenario at number timeeval nominal_share workers engine".split()
 _MOST_EVENTS = 10_000
 
 
 def check(options: argparse.Namespace) -> argparse.Namespace:
-    """Checks the options of a command, and replaces texts by what they say, such as `options.scenario` by a list of `Degraded`.
+    """Checks the options of a command, and replaces texts by what they say, such as `options.scenario` by a list of `ScenarioRange`.
 
     Raises:
-        InputError: If a value is out of range, or options contradict each other.
+        InputError: If a value is out of range, options contradict each other, or there is no such source or simulator.
     """
-    if options.seed is not None and not 0 <= options.seed < 2**31:
+    if not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
     checks = {"fit": _check_fit, "generate": _check_generate, "score": _check_score, "update": _check_update, "inject": _check_inject}
     if options.command in checks:
         checks[options.command](options)
+    for source in (getattr(options, "source", None), getattr(options, "coarse", None)):
+        if source is not None:
+            existing(source)
+    if hasattr(options, "models"):
+        from enhsim_tf.simulator.model_folder import models_of  # imports NumPy, so it comes last
+
+        models_of(options.models)
     return options
 
 
@@ -47,17 +55,21 @@ def _check_update(options: argparse.Namespace) -> None:
 
 
 def _check_inject(options: argparse.Namespace) -> None:
-    from enhsim_tf.datasets.inject_options import INJECTIONS, InjectOptions
+    from enhsim_tf.datasets.inject_options import INJECTIONS, WITHOUT_SEVERITY, InjectOptions
     from enhsim_tf.datasets.places import split_limits
 
     kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
-    least, greatest = split_limits("severity", options.severity)
+    least, greatest = split_limits("severity", options.severity or "4")
     try:
         severity = float(least), float(greatest)
     except ValueError:
         raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
     length = split_limits("length", options.length)
     options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed)
+    if options.chosen.is_joint:
+        _refuse(options, f"with {kinds[0]}, which has drawn places and the estimated noise", "at", "noise_sd")
+        if set(kinds) <= set(WITHOUT_SEVERITY):
+            _refuse(options, f"with {', '.join(kinds)}: of the kinds of several channels, common_shift alone has one", "severity")
     options.cleaning = cleaning_options(options, 3)
 
 
@@ -67,28 +79,24 @@ def _check_generate(options: argparse.Namespace) -> None:
         _refuse(options, "with --coarse, because the run gives length, times and labels", *_NOT_OF_RUNS)
         return
     _refuse(options, "without --coarse", *_OF_RUNS)
-    options.is_large = bool(options.workers or options.engine or options.scenarios)
-    if options.scenarios is not None:
-        _refuse(options, "with --scenarios, whose file gives them", "scenario", "nominal_share")
+    options.is_large = bool(options.workers or options.engine)
     if options.continuous is None:
         _refuse(options, "without --continuous", "start", "at", "number", "timeeval")
-        if options.windows is None and options.scenarios is None:
+        if options.windows is None:
             raise InputError("Expected --windows or --continuous. Received: neither. Give one of them.")
     else:
-        _refuse(options, "with --continuous, which makes one series", "nominal_share", "workers", "engine", "scenarios")
+        _refuse(options, "with --continuous, which makes one series", "nominal_share", "workers", "engine")
     if not options.scenario:
         _refuse(options, "without --scenario", "nominal_share")
     options.nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
     if not 0 <= options.nominal_share <= 1:
         raise InputError(f"Expected a nominal share from 0 to 1. Received: {options.nominal_share}.")
     options.workers = parse_workers(options.workers, options.engine)
-    from enhsim_tf.datasets.places import divide_windows, parse_scenario  # imports NumPy, so it comes last
+    from enhsim_tf.datasets.places import parse_scenario  # imports NumPy, so it comes last
 
     options.scenario = [parse_scenario(text) for text in options.scenario]
     if options.continuous is not None:
         _check_series(options)
-    elif not options.is_large:
-        options.shares = divide_windows(options.scenario, options.nominal_share, options.windows, options.seed or 0)
 
 
 def _check_series(options: argparse.Namespace) -> None:
@@ -101,6 +109,12 @@ def _check_series(options: argparse.Namespace) -> None:
         )
     if options.number is not None and not (1 <= options.number <= _MOST_EVENTS and options.scenario):
         raise InputError(f"Expected --number from 1 to {_MOST_EVENTS:,}, with --scenario. Received: --number {options.number}.")
+    for scenario in options.scenario if options.number is not None else ():
+        if scenario.channel is not None or scenario.onset[0] < scenario.onset[1]:
+            raise InputError(
+                f"Expected only MODE:SEVERITY with --number, whose events have drawn places in all channels. Received: {scenario} with a channel "
+                "or a range of onsets. Leave it out."
+            )
     options.at = [parse_place(text, 1.0) for text in options.at]
     for place in options.at:
         Degraded(place.kind, place.severity)  # checks both

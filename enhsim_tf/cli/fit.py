@@ -10,7 +10,6 @@ import dataclasses
 import functools
 import json
 import os
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -25,12 +24,11 @@ from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from enhsim_tf.common.size_limits import short_reason
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.report import Report
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
+from enhsim_tf.telemetry.cleaning.clean import Cleaned, clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
 from enhsim_tf.telemetry.series import check_values
 from enhsim_tf.telemetry.sources import read_source
@@ -85,7 +83,7 @@ def fit_channels(
 
     Raises:
         InputError: Before any fit, if a channel's name cannot be used for a folder or an output folder contains something other
-            than a saved simulator. Also if the engine is not available or a simulator cannot be written.
+            than a saved simulator. Also if the engine is not available.
     """
     out = Path(os.path.abspath(options.out))
     if (out / MANIFEST).is_file():
@@ -101,13 +99,13 @@ def fit_channels(
     work = functools.partial(fit_or_say, out=out, options=options, read_run=read_run, commands=commands)
     in_this_process = options.workers == 0 or (len(groups) == 1 and options.engine == "local")
     try:
-        remove_leftovers(make_folder(out))
+        make_folder(out)
         for outcome in map(work, groups) if in_this_process else _fitted_by_processes(work, groups, options.engine, options.workers):
             reports, failed = reports | outcome.reports, failed | outcome.failed
             for line in outcome.lines:
                 say(line)
     finally:
-        remove_leftovers(out)  # temporary files of workers that were killed
+        remove_leftovers(out)  # temporary files of workers that were killed, also of an earlier run
         with contextlib.suppress(OSError):
             for folder in new_folders:
                 folder.rmdir()  # only if it is empty, because nothing was fitted
@@ -119,27 +117,18 @@ def _name(group: Group) -> str:
 
 
 def _fitted_by_processes(work: Callable[[Group], Outcome], groups: Sequence[Group], engine: str, workers: int | None) -> Iterator[Outcome]:
-    """Fits the channels with an engine. A channel whose worker dies repeatedly is reported and does not stop the others."""
-    batches = [(groups, workers)]
-    while batches:
-        some, workers = batches.pop()
-        waiting = {_name(group): group for group in some}
+    """Fits the channels with an engine. If its workers keep dying, the channels that they had taken fail, and the others are fitted."""
+    waiting = {_name(group): group for group in groups}
+    while waiting:
         try:
-            with contextlib.closing(engines.run(engine, work, some, workers)) as running:
+            with contextlib.closing(engines.run(engine, work, list(waiting.values()), workers)) as running:
                 for outcome in running:
                     del waiting[outcome.name]
                     yield outcome
         except ProcessesDiedError as died:
-            suspects = [waiting.pop(_name(group)) for group in died.items if _name(group) in waiting]
-            if not suspects:
-                raise
-            if len(some) == 1:
-                what = "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory."
-                yield Outcome(_name(some[0]), failed=dict.fromkeys(some[0], f"{what} Give less telemetry."))
-                continue
-            batches += [(list(waiting.values()), workers)] if waiting else []
-            # one at a time, to find the one that kills its worker, and to give it all the memory
-            batches += [([group], 1) for group in suspects]
+            for group in died.items:
+                del waiting[_name(group)]
+                yield Outcome(_name(group), failed=dict.fromkeys(group, str(died)))
 
 
 def fit_or_say(
@@ -149,51 +138,33 @@ def fit_or_say(
     read_run: Callable[..., Recording] | None,
     commands: np.ndarray | None,
 ) -> Outcome:
-    """Fits the channels of a group. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
+    """Fits the channels of a group. An InputError about some of them is returned; lack of disk space or memory is raised."""
     from enhsim_tf.simulator.fitting import fit
 
     cleaned, outcome = {}, Outcome(_name(group))
     for name, series in group.items():
-        with _failing(outcome, [name]):
-            cleaned[name] = _cleaned(name, series, options.cleaning)
+        try:
+            found = clean(series, options.cleaning)
+            check_values(np.concatenate([part.values for part in found.parts]), name)
+            cleaned[name] = found
+        except InputError as error:
+            outcome.failed[name] = str(error)
     outcome.lines += lines_of([each.report for each in cleaned.values()])
     groups = join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []
     if len(groups) > 1:
         others = "; ".join(spoken(each.columns) for each in groups)
         outcome.lines.append(f"channels of other sampling intervals or times get a simulator of their own: {others}")
+    speaks = options.engine == "local" and not options.json
     for telemetry in groups:
-        with _failing(outcome, telemetry.columns):
-            speaks = options.engine == "local" and not options.json
-            progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if speaks else SILENT
-            interval_s = telemetry.interval_s if telemetry.start is not None else None
+        progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if speaks else SILENT
+        interval_s = telemetry.interval_s if telemetry.start is not None else None
+        try:
             run = None if read_run is None else read_run(interval_s=interval_s)
             fitted = fit(telemetry, run, options.chosen, progress, commands if len(group) == 1 else None)
             _save(*fitted, cleaned, out, outcome)
+        except InputError as error:
+            outcome.failed |= dict.fromkeys(telemetry.columns, str(error))
     return outcome
-
-
-def _cleaned(name: str, series: pd.Series, cleaning: Cleaning) -> Cleaned:
-    cleaned = clean(series, cleaning)
-    check_values(np.concatenate([part.values for part in cleaned.parts]), name)
-    return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
-
-
-@contextlib.contextmanager
-def _failing(outcome: Outcome, names: Sequence[str]) -> Iterator[None]:
-    """Notes why work on channels could not be done."""
-    try:
-        yield
-    except InputError as error:
-        outcome.failed |= dict.fromkeys(names, str(error))
-    except BrokenPipeError:  # the reader has left, which ends the command
-        raise
-    except (OSError, MemoryError) as error:  # concerns all channels
-        said = f"{short_reason(error)}. Finished channels are kept; free some space."
-        raise InputError(f"Expected enough memory and disk space. Received: {said}") from error
-    except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
-        where, reason = traceback.extract_tb(error.__traceback__)[-1], " ".join(str(error).split())[:200]
-        said = f"{type(error).__name__}: {reason}, in {Path(where.filename).name}, line {where.lineno}"
-        outcome.failed |= dict.fromkeys(names, f"Expected a fit. Received: {said}. Please report this defect.")
 
 
 def _save(simulator: EnhancedSimulator, report: Report, cleaned: Mapping[str, Cleaned], out: Path, outcome: Outcome) -> None:

@@ -2,14 +2,11 @@
 
 import argparse
 import os
-from pathlib import Path
 
-import pandas as pd
-
-from enhsim_tf.cli.options import cleaned_channels, counted, for_each, output_paths, refuse_same_file
+from enhsim_tf.cli.options import cleaned_channels, for_each, output_paths, refuse_same_file
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import printable
-from enhsim_tf.datasets.inject import inject_channel, inject_joint, join_injected
+from enhsim_tf.common.errors import counted, spoken
+from enhsim_tf.datasets.inject import inject, join_injected
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.cleaning.report import lines_of
@@ -22,39 +19,30 @@ def run_inject(options: argparse.Namespace) -> int:
     series = read_source(options.source, options.column, options.time, cleaning)
     suffixes = (".csv",) if options.timeeval else (".parquet", ".csv")
     is_one_file = chosen.is_joint or (options.timeeval and options.out.suffix in suffixes and not os.path.isdir(options.out))
-    paths = output_paths(options.out, ["all channels"] if is_one_file else series, suffixes)
+    files = {"all channels": list(series)} if is_one_file else {name: [name] for name in series}
+    paths = output_paths(options.out, files, suffixes)
     refuse_same_file(paths.values(), options.source)
 
-    def inject(channel: str, path: Path) -> tuple[pd.DataFrame, str]:
-        cleaned = clean(series[channel], cleaning)
-        frame = inject_channel(cleaned.parts, chosen)
-        said = "given" if chosen.noise_sd is not None else "estimated from second differences"
-        number = len(frame.attrs["anomalies"])
-        what = f"{number:,} {'anomaly' if number == 1 else 'anomalies'}, {_changed(frame)}; noise sd {frame.attrs['noise_sd']:.4g} ({said})"
-        return frame, "\n".join([*cleaned.report.lines(), f"{printable(channel)}: {what}; in {path}"])
+    def write(file: str) -> None:
+        channels, path = files[file], paths[file]
+        if chosen.is_joint:
+            telemetry, cleaned = cleaned_channels(series, {name: name for name in channels}, cleaning)
+            tables = {spoken(channels): inject(telemetry, chosen)}
+        else:
+            cleaned = {name: clean(series[name], cleaning) for name in channels}
+            tables = {name: inject(each.parts, chosen) for name, each in cleaned.items()}
+        frame = join_injected(tables) if len(tables) > 1 else next(iter(tables.values()))
+        write_table(path, frame, channels if options.timeeval else ())
+        if options.figure:
+            from enhsim_tf.simulator.figures import inject_figure  # matplotlib is slow to import
 
-    def write(channel: str) -> None:
-        frame, text = inject(channel, paths[channel])
-        write_table(paths[channel], frame, [channel] if options.timeeval else ())
-        tell(text)
-
-    if not is_one_file:
-        return for_each(series, write)
-    (path,) = paths.values()
-    if chosen.is_joint:
-        telemetry, cleaned = cleaned_channels(series, {name: name for name in series}, cleaning)
-        frame = inject_joint(telemetry, chosen)
+            inject_figure(frame, channels).savefig(path.with_suffix(".png"), dpi=200, format="png")
         lines = lines_of([each.report for each in cleaned.values()])
-        for kind, _, begin, end, channel in frame.attrs["anomalies"]:
-            lines.append(f"{kind} of {printable(channel)} from sample {begin:,} to {end:,}")
-        lines.append(f"{printable(telemetry.name)}: {_changed(frame)}; in {path}")
-    else:
-        made = {channel: inject(channel, path) for channel in series}
-        frame, lines = join_injected({channel: each for channel, (each, _) in made.items()}), [text for _, text in made.values()]
-    write_table(path, frame, list(series) if options.timeeval else ())
-    tell("\n".join(lines))
-    return 0
+        said = "given" if chosen.noise_sd is not None else "estimated from second differences"
+        for name, table in tables.items():
+            number, changed = counted(len(table.attrs["anomalies"]), "anomaly"), counted(int(table["mask"].sum()), "sample")
+            noise = "" if chosen.is_joint else f"; noise sd {table.attrs['noise_sd']:.4g} ({said})"
+            lines.append(f"{spoken([name])}: {number}, {changed} of {len(table):,} changed{noise}; in {path}")
+        tell("\n".join(lines))
 
-
-def _changed(frame: pd.DataFrame) -> str:
-    return f"{counted(int(frame['mask'].sum()), 'sample')} of {len(frame):,} changed"
+    return for_each(files, write)

@@ -41,11 +41,6 @@ def tell_failed(failed: dict[str, str]) -> int:
     return 2 if failed else 0
 
 
-def counted(number: int, noun: str) -> str:
-    """Formats a number with its noun, for example `1 window` or `2,000 windows`."""
-    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
-
-
 def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
     """Returns the output file of each channel.
 
@@ -129,10 +124,5 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
         raise InputError(
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."
         )
-    columns = simulator.alignment.columns
-    try:
-        return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)
-    except InputError as error:
-        if series.table is None or not set(columns) <= set(series.table):
-            raise
-        raise InputError(f"{error} Perhaps {options.source}, which has the columns of the run, is the run. Swap the two.") from None
+    given = options.coarse, simulator.alignment.columns, options.coarse_time
+    return read_recording(*given, cleaning.of_run(), simulator.interval_s, options.coarse_start)

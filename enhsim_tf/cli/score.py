@@ -9,16 +9,15 @@ import pandas as pd
 from enhsim_tf.cli.options import (
     channels_by_model,
     cleaned_channels,
-    counted,
     for_each,
     output_paths,
     refuse_same_file,
     run_for,
 )
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import printable, spoken
+from enhsim_tf.common.errors import counted, printable, spoken
 from enhsim_tf.simulator.model_folder import models_of
-from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
+from enhsim_tf.simulator.scoring import NEW, events_path, events_table, score, write_scores
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.report import lines_of
 from enhsim_tf.telemetry.sources import read_source
@@ -88,10 +87,12 @@ def _said(frame: pd.DataFrame, simulator: EnhancedSimulator, path: Path) -> list
     if "out_of_range" in frame:
         outside = float((frame["out_of_range"] > 1).sum())
         line += f"; {outside / max(scored, 1):.1%} outside the training range" if outside else ""
-    number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
+    (expected, low, high), found = frame.attrs["false_alarms_per_day"], frame.attrs["events"]
+    later = counted(sum(event["against"] == NEW for event in found), "event")
+    kinds = f" (1 lasting departure; {later} against the new operating point)" if frame.attrs["departure"] else ""
     unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
     events = (
-        f"{counted(number, 'event')} in {events_path(path)}; on generated nominal telemetry {expected:.3g} false alarms per {unit} "
+        f"{counted(len(found), 'event')} in {events_path(path)}{kinds}; on generated nominal telemetry {expected:.3g} false alarms per {unit} "
         f"(95 % interval {low:.3g} to {high:.3g})"
     )
     return [*lines, f"{line}; in {path}", f"{name}: {events}"]

@@ -8,8 +8,8 @@ from pathlib import Path
 from enhsim_tf.cli.options import channels_by_model, cleaned_channels, for_each, run_for
 from enhsim_tf.common.atomic_files import replace_folder, write_json
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.simulator.model_folder import folder_of, models_of, refuse_foreign
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator.model_folder import MANIFEST, folder_of, models_of, refuse_foreign
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.updating import update
 from enhsim_tf.telemetry.cleaning.report import lines_of
@@ -25,10 +25,9 @@ def run_update(options: argparse.Namespace) -> int:
     folders = {model: folder_of(out, model) for model in channels}
     for model, folder in folders.items():
         refuse_foreign(folder)
-        is_there = folder.is_dir() and any(folder.iterdir())
-        if is_there and not options.replace:
+        if (folder / MANIFEST).is_file() and not options.replace:
             raise InputError(
-                f"Expected --out without a model of {printable(model)}, because update keeps the old one. Received: {folder}. "
+                f"Expected --out without a model of {model}, because update keeps the old one. Received: {folder}. "
                 "Give another --out, or --replace."
             )
     found = {}

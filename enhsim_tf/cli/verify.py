@@ -3,7 +3,8 @@
 import argparse
 
 from enhsim_tf.common.console import tell
-from enhsim_tf.datasets.folder import find_problems, read_manifest
+from enhsim_tf.common.errors import counted
+from enhsim_tf.datasets.folder import find_problems, num_shards, read_manifest
 
 
 def run_verify(options: argparse.Namespace) -> int:
@@ -14,5 +15,5 @@ def run_verify(options: argparse.Namespace) -> int:
         code = 2
     if not code:
         settings = read_manifest(options.folder)["settings"]
-        tell(f"{settings['windows']:,} windows in {-(-settings['windows'] // settings['shard']):,} shards, all intact")
+        tell(f"{counted(settings['windows'], 'window')} in {counted(num_shards(settings), 'shard')}, all intact")
     return code

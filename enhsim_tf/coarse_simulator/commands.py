@@ -20,8 +20,6 @@ class CommandTraces:
 
     def __init__(self, chosen: Sequence[tuple[int, float]]):
         self.chosen = tuple((int(number), float(decay)) for number, decay in chosen)
-        if not self.chosen or not all(decay >= 0 for _, decay in self.chosen):
-            raise InputError(f"Expected commands, each with a decay of 0 samples or more. Received: {self.chosen}. Fit the model again.")
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.interface import check_columns
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import short_reason
+from enhsim_tf.common.read_errors import short_reason
 
 
 class FmuSimulator:

@@ -39,3 +39,9 @@ def printable(text: str) -> str:
 def spoken(channels: Sequence[str]) -> str:
     """Returns the channels as a line of a report names them: up to three by their names, more by their number."""
     return printable(", ".join(channels) if len(channels) <= 3 else f"{len(channels)} channels")
+
+
+def counted(number: int, noun: str) -> str:
+    """Formats a number with its noun, for example `1 window`, `2,000 windows` or `3 anomalies`."""
+    several = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    return f"{number:,} {noun if number == 1 else several}"

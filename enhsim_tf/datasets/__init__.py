@@ -1,1 +1,1 @@
-"""Labelled data sets of any size: windows, series, shards, and the scenario files that describe them."""
+"""Labelled data sets of any size: windows, series, and shards."""

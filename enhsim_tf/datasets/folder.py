@@ -1,15 +1,14 @@
-"""Files of a large data set: shards, `_manifest.json`, and during generation `_journal.jsonl` and `.lock`.
+"""Files of a large data set: shards, `_manifest.json`, and during generation `.lock`.
 
-The manifest contains the settings of the data set and, once it is finished, the record (rows and checksum) of each shard.
-During generation, each finished shard appends its record to the journal. An incomplete last line is ignored, and its shard
-is generated again. Before a run resumes, the checksum of every recorded shard is verified.
+The manifest contains the settings of the data set and, once it is finished, the checksum of each shard. Until then, a shard
+is finished if its file is there, because files are written atomically, and has the key of the plan and the right number of rows.
 """
 
 import contextlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +16,11 @@ import filelock
 
 from enhsim_tf.common.atomic_files import sha256, write_json
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import read_json
-from enhsim_tf.datasets.mix import MOST_WINDOWS
 from enhsim_tf.datasets.plan import FORMAT, Plan
-from enhsim_tf.datasets.shard import Record, shard_file
+from enhsim_tf.datasets.shard import shard_file
 
-MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of Parquet folders skip such names
+MANIFEST, _LOCK = "_manifest.json", ".lock"  # readers of Parquet folders skip such names
 _SHARD = re.compile(r"shard-(\d{6,})\.parquet")
-_SHA256 = re.compile("[0-9a-f]{64}")
-_MOST_BYTES = 1_000_000_000  # maximum size of a manifest
 
 
 @contextlib.contextmanager
@@ -63,73 +58,34 @@ def check_folder(folder: Path, plan: Plan) -> None:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Reads and validates the manifest of a data set. Its `shards` are returned as `Record`s, or None if it is not finished."""
+    """Reads and validates the manifest of a data set. Its `shards` are the checksums by the names of the files, None if it is not finished."""
     if not os.path.isfile(folder / MANIFEST):
         raise InputError(f"Expected a data set of `generate --workers`. Received: {folder}, which has no {MANIFEST}. Give another folder.")
     try:
-        content = read_json(folder / MANIFEST, _MOST_BYTES)
+        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
         settings, shards = content["settings"], content["shards"]
-        are_counts = all(type(settings[name]) is int and 1 <= settings[name] <= MOST_WINDOWS for name in ("windows", "shard"))
-        if content["format"] != FORMAT or not are_counts:
+        if content["format"] != FORMAT or not min(settings["windows"], settings["shard"]) >= 1:
             raise ValueError(f"format or settings of something else: {str(content['format'])[:80]}")
-        if shards is not None:
-            content["shards"] = [_record_of(number, each["rows"], each["sha256"]) for number, each in enumerate(shards)]
+        names = map(shard_file, range(num_shards(settings)))
+        if shards is not None and (len(shards) != num_shards(settings) or list(dict(shards)) != list(names)):
+            raise ValueError(f"{len(shards):,} other shards than the {num_shards(settings):,} of its settings")
     except (OSError, ValueError, KeyError, TypeError) as error:
-        reason = f"{type(error).__name__}: {' '.join(str(error).split())[:120]}"
         raise InputError(
             f"Expected a data set of `generate` of the format {FORMAT}. Received: {folder}, whose {MANIFEST} is damaged or another one "
-            f"({reason}). Give another folder, or remove this one and run `generate` again."
+            f"({type(error).__name__}: {str(error)[:120]}). Give another folder, or remove this one and run `generate` again."
         ) from None
     return content
 
 
-def _record_of(*values: Any) -> Record:
-    if [type(each) for each in values] != [int, int, str] or not _SHA256.fullmatch(values[2]):
-        raise ValueError("something that is no record of a shard")
-    return Record(*values)
+def num_shards(settings: Mapping[str, int]) -> int:
+    """Returns the number of shards of a data set with these settings."""
+    return -(-settings["windows"] // settings["shard"])
 
 
-def read_records(folder: Path) -> dict[int, Record]:
-    """Returns the records of all finished shards, by the number of the shard. Invalid lines of the journal are ignored."""
-    records = {record.shard: record for record in read_manifest(folder)["shards"] or ()}
-    if not (folder / JOURNAL).exists():
-        return records
-    with open(folder / JOURNAL, "rb") as journal:
-        for line in journal:
-            with contextlib.suppress(ValueError, TypeError, RecursionError):
-                record = _record_of(*json.loads(line))
-                records[record.shard] = record
-    return records
-
-
-@contextlib.contextmanager
-def open_journal(folder: Path) -> Iterator[Callable[[Record], None]]:
-    """Opens the journal and yields a function that appends a record. After an incomplete last line, it begins on a new one."""
-    with open(folder / JOURNAL, "ab") as journal:
-        journal.write(b"\n" if journal.tell() else b"")
-
-        def write(record: Record) -> None:
-            journal.write(json.dumps(record).encode() + b"\n")
-            journal.flush()
-
-        yield write
-
-
-def write_manifest(folder: Path, plan: Plan, records: Mapping[int, Record] | None = None) -> None:
-    """Writes the manifest of a data set, finished if the records of all its shards are given, by the number of the shard."""
-    shards = None
-    if records is not None:
-        all_of = [records[number] for number in range(plan.num_shards)]
-        shards = [{"file": shard_file(each.shard), "rows": each.rows, "sha256": each.sha256} for each in all_of]
+def write_manifest(folder: Path, plan: Plan, checksums: Mapping[int, str] | None = None) -> None:
+    """Writes the manifest of a data set, finished if the checksums of all its shards are given, by the number of the shard."""
+    shards = None if checksums is None else {shard_file(shard): checksums[shard] for shard in range(plan.num_shards)}
     write_json(folder / MANIFEST, {"format": FORMAT, "settings": plan.settings(), "shards": shards})
-
-
-def is_intact(folder: Path, record: Record) -> bool:
-    """Whether the file of a shard exists and has the recorded checksum."""
-    try:
-        return sha256(folder / shard_file(record.shard)) == record.sha256
-    except OSError:
-        return False
 
 
 def find_problems(folder: str | os.PathLike) -> Iterator[str]:
@@ -140,18 +96,12 @@ def find_problems(folder: str | os.PathLike) -> Iterator[str]:
     """
     folder = Path(folder)
     manifest = read_manifest(folder)
-    settings, records = manifest["settings"], manifest["shards"]
-    expected = -(-settings["windows"] // settings["shard"])
-    if records is None:
-        yield f"not finished: {len(read_records(folder)):,} of {expected:,} shards are recorded; run the same `generate` again"
+    shards, there = manifest["shards"], {path.name for path in folder.iterdir() if _SHARD.fullmatch(path.name) and path.is_file()}
+    if shards is None:
+        yield f"not finished: {len(there):,} of {num_shards(manifest['settings']):,} shards are there; run the same `generate` again"
         return
-    num_windows = sum(record.rows for record in records)
-    if len(records) != expected or num_windows != settings["windows"]:
-        yield f"{MANIFEST}: {len(records):,} shards recorded of {expected:,}, {num_windows:,} windows"
-    for record in records:
-        if not is_intact(folder, record):
-            yield f"{shard_file(record.shard)}: missing, or its checksum differs from the recorded one"
-    known = {shard_file(record.shard) for record in records}
-    for path in sorted(folder.iterdir()):
-        if path.name not in known and (_SHARD.fullmatch(path.name) or path.name == JOURNAL):
-            yield f"{path.name}: not a file of this data set"
+    for name, checksum in shards.items():
+        if name not in there or sha256(folder / name) != checksum:
+            yield f"{name}: missing, or its checksum differs from the recorded one"
+    for name in sorted(there - set(shards)):
+        yield f"{name}: not a file of this data set"

@@ -4,68 +4,122 @@ Most kinds of anomaly change one channel. Those of `JOINT_KINDS` need several: t
 how channels move together, and one is a fault that acts on all of them.
 """
 
+import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.inject_options import InjectOptions, checked_place
+from enhsim_tf.datasets.inject_options import WITHOUT_SEVERITY, InjectOptions, checked_place
 from enhsim_tf.datasets.label_columns import series_table
 from enhsim_tf.datasets.places import draw_between, length_limits
-from enhsim_tf.detection.anomalies import estimate_noise_sd, inject_anomalies
+from enhsim_tf.detection.anomalies import INJECTIONS, estimate_noise_sd
 from enhsim_tf.simulator.joint import telemetry_of
 from enhsim_tf.telemetry.pandas_series import index_of
-from enhsim_tf.telemetry.placing import PlacedEvent, draw_begin, place_events
+from enhsim_tf.telemetry.placing import PlacedEvent, draw_begin, in_order, place_events
 from enhsim_tf.telemetry.series import Telemetry
 
 
-def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> pd.DataFrame:
-    """Injects anomalies into the nominal telemetry of a channel.
+def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -> pd.DataFrame:
+    """Injects anomalies into nominal telemetry: into one channel, or, if kinds are among `JOINT_KINDS`, into several.
 
     Args:
-        parts: Regularly sampled parts of telemetry, as returned by `cleaning.clean`.
+        telemetry: Several channels, as `join_channels` returns them, or the parts of one channel, as `clean` returns them.
         options: Which anomalies are injected, and where.
 
     Returns:
-        A data frame with the index of `pandas_series.to_series` and the columns `value` and `label_columns.LABELS`. `frame.attrs` holds
-        `noise_sd`, and `anomalies`, a list of `placing.PlacedEvent` in the order of time. Samples that are not marked keep the value
-        of the telemetry.
+        A data frame with the index of `to_series` and the columns `value` (of several channels, their names, and `mask NAME` for each) and
+        `label_columns.LABELS`. Samples that are not marked keep the value of the telemetry. `frame.attrs` holds `noise_sd` (of several
+        channels a list); `anomalies`, a list of `placing.PlacedEvent` in the order of time, each from its first to its last changed sample;
+        and `counts`, whether the clock counts from zero.
 
     Raises:
         InputError: If anomalies overlap, do not fit or change no sample, or if the noise of the channel cannot be estimated.
     """
-    rng = np.random.default_rng([options.seed, *parts[0].name.encode()])
-    values, interval_s = [part.values for part in parts], parts[0].interval_s
-    noise_sd = estimate_noise_sd(values) if options.noise_sd is None else options.noise_sd
-    if not noise_sd > 0:
+    if not isinstance(telemetry, Recording):
+        runs, first = tuple(Run(part.values[:, None], part.offset_s) for part in telemetry), telemetry[0]
+        telemetry = Recording(runs, (first.name,), first.interval_s, first.start, first.name)
+    kinds, names, interval_s = options.kinds, telemetry.columns, telemetry.interval_s
+    if options.is_joint and len(names) < 2:
+        raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
+    nominal, index = telemetry.values.astype(np.float32), index_of(telemetry_of(telemetry))
+    series = [[part.values[:, channel] for part in telemetry.parts] for channel in range(len(names))]
+    noise_sd = np.array([options.noise_sd or estimate_noise_sd(parts) for parts in series])
+    if not options.is_joint and not noise_sd[0] > 0:
         raise InputError(
-            f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {parts[0].name}, in which every "
+            f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {names[0]}, in which every "
             "second difference is zero. Give the standard deviation with --noise-sd."
         )
-    index = index_of(parts)
+    rng = np.random.default_rng([options.seed, *([61] if options.is_joint else names[0].encode())])
     shortest, longest = length_limits(options.length, interval_s)
-    number = (len(options.kinds) if options.number is None else options.number) if options.kinds else 0
     drawn = [
-        (options.kinds[each % len(options.kinds)], draw_between(options.severity, rng), int(rng.integers(shortest, longest + 1)))
-        for each in range(number)
+        (kind, 1.0 if kind in WITHOUT_SEVERITY else draw_between(options.severity, rng), int(rng.integers(shortest, longest + 1)))
+        for kind in itertools.islice(itertools.cycle(kinds), options.number or len(kinds))
     ]
     given = []
     for place in map(checked_place, options.at):
         severity = draw_between(options.severity, rng) if place.severity is None else place.severity
         given.append(PlacedEvent(place.kind, severity, *place.samples(index, interval_s)))
-    gap = max([length for *_, length in drawn], default=0)
-    changed, mask, anomalies = inject_anomalies(values, given, drawn, noise_sd, gap, rng)
-    events = [(each.kind, each.severity, each.begin, each.end) for each in anomalies]
-    frame = series_table(changed[:, None], mask[:, None], [parts[0].name], events, index)
-    frame.attrs.update(noise_sd=noise_sd, anomalies=anomalies)
+    bounds = list(itertools.pairwise(np.cumsum([0, *map(len, telemetry.parts)]).tolist()))
+    values, found = nominal.copy(), []
+
+    def changes(event: PlacedEvent) -> bool:
+        """Puts an anomaly into the series; whether it has changed a sample."""
+        here, channel = slice(event.begin, event.end), int(rng.integers(len(names)))
+        with np.errstate(over="ignore"):
+            if event.kind == "common_shift":
+                values[here] = nominal[here] + (event.severity * noise_sd).astype(np.float32)
+            else:
+                values[here, channel] = _changed(nominal, event, channel, event.severity * noise_sd[channel], bounds, rng)
+        if not np.isfinite(values[here]).all():
+            raise InputError(f"Expected anomalies within the range of float32. Received: {event}. Choose a lower severity.")
+        places = np.flatnonzero((values[here] != nominal[here]).any(axis=1))
+        if len(places):
+            begin, length = event.begin + int(places[0]), int(places[-1] - places[0]) + 1
+            name = None if event.kind == "common_shift" else names[channel]
+            found.append(dataclasses.replace(event, begin=begin, length=length, channel=name))
+        return len(places) > 0
+
+    for event in in_order(given, bounds):
+        if not changes(event):
+            raise InputError(
+                f"Expected an anomaly that changes the telemetry. Received: {event}, which changes no sample. "
+                "Choose another place, a longer one or a higher severity."
+            )
+    place_events(given, drawn, bounds, max([length for *_, length in drawn], default=0), changes, rng)
+    found.sort(key=lambda each: each.begin)
+    frame = series_table(values, values != nominal, names, [(each.kind, each.severity, each.begin, each.end) for each in found], index)
+    frame.attrs.update(noise_sd=noise_sd.squeeze().tolist(), anomalies=found, counts=telemetry.clock().counts)
     return frame
 
 
+def _changed(
+    nominal: np.ndarray, event: PlacedEvent, channel: int, size: float, bounds: Sequence[tuple[int, int]], rng: np.random.Generator
+) -> np.ndarray:
+    """Returns what a channel becomes during an anomaly of one channel."""
+    here, length = slice(event.begin, event.end), event.length
+    start, stop = next(each for each in bounds if each[0] <= event.begin < each[1])
+    if event.kind in INJECTIONS:
+        centre = nominal[None, start:stop, channel].mean(axis=1, dtype=np.float64, keepdims=True)
+        return INJECTIONS[event.kind](nominal[None, here, channel].astype(np.float64), size, centre, rng)[0]
+    if event.kind == "delay":
+        return nominal[np.maximum(np.arange(event.begin, event.end) - max(1, length // 4), start), channel]
+    first = draw_begin(bounds, [(event.begin, event.end)], length, 0, rng)
+    away = slice(first, first + length)
+    if event.kind == "another_time":
+        return nominal[away, channel]
+    others = np.delete(nominal, channel, axis=1).astype(np.float64)
+    centred = others - others.mean(axis=0)
+    weights, *_ = np.linalg.lstsq(centred, nominal[:, channel] - nominal[:, channel].mean(dtype=np.float64), rcond=None)
+    follows = centred @ weights
+    return nominal[here, channel] - follows[here] + follows[away]
+
+
 def join_injected(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Joins the tables of `inject_channel` to one with the values of all channels and `mask`, which marks what is changed in any of them."""
+    """Joins the tables of several channels to one with their values and `mask`, which marks what is changed in any of them."""
     (first, frame), *others = frames.items()
     for name, other in others:
         if not other.index.equals(frame.index):
@@ -73,67 +127,7 @@ def join_injected(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
                 f"Expected channels with the same times for one TimeEval file. Received: {first!r} with {len(frame):,} and {name!r} with "
                 f"{len(other):,} samples, or other times. Give a folder as --out, which gets one file per channel."
             )
-    values = {name if others else "value": each["value"] for name, each in frames.items()}
-    return pd.DataFrame(values | {"mask": np.any([each["mask"] for each in frames.values()], axis=0)}, index=frame.index)
-
-
-def inject_joint(telemetry: Recording, options: InjectOptions) -> pd.DataFrame:
-    """Injects anomalies of `JOINT_KINDS` into nominal telemetry of several channels, at drawn places.
-
-    Args:
-        telemetry: Nominal telemetry.
-        options: Which anomalies are injected. The severity is that of `common_shift`.
-
-    Returns:
-        A data frame with one row per sample: the channels, `label_columns.LABELS` and `mask NAME` for each channel. Samples that are not marked
-        keep their values. `frame.attrs["anomalies"]` has kind, severity, begin, end and channel of each.
-    """
-    kinds = options.kinds
-    if len(telemetry.columns) < 2:
-        raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
-    rng, (shortest, longest) = np.random.default_rng([options.seed, 61]), length_limits(options.length, telemetry.interval_s)
-    values = telemetry.values.astype(np.float32)
-    bounds, nominal = list(itertools.pairwise(np.cumsum([0, *map(len, telemetry.parts)]).tolist())), values.copy()
-    noise_sd = np.array([estimate_noise_sd([part.values[:, channel] for part in telemetry.parts]) for channel in range(values.shape[1])])
-    drawn = [(kinds[each % len(kinds)], 1.0, int(rng.integers(shortest, longest + 1))) for each in range(options.number or len(kinds))]
-    found: list[tuple[str, float, int, int, str]] = []
-
-    def changes(event: PlacedEvent) -> bool:
-        """Puts an anomaly into the series; whether it has changed a sample."""
-        is_common, here = event.kind == "common_shift", slice(event.begin, event.end)
-        degree = draw_between(options.severity, rng) if is_common else 1.0
-        channel = int(rng.integers(values.shape[1]))
-        if is_common:
-            values[here] += (degree * noise_sd).astype(np.float32)
-        else:
-            values[here, channel] = _changed(nominal, event.kind, here, channel, bounds, rng)
-        is_changed = bool((values[here] != nominal[here]).any())
-        if is_changed:
-            found.append((event.kind, degree, event.begin, event.end, "all" if is_common else telemetry.columns[channel]))
-        return is_changed
-
-    place_events([], drawn, bounds, longest, changes, rng)
-    found.sort(key=lambda each: each[2])
-    index = index_of(telemetry_of(telemetry))
-    frame = series_table(values, values != nominal, telemetry.columns, [each[:4] for each in found], index)
-    frame.attrs["anomalies"] = found
-    return frame
-
-
-def _changed(
-    nominal: np.ndarray, kind: str, here: slice, channel: int, bounds: Sequence[tuple[int, int]], rng: np.random.Generator
-) -> np.ndarray:
-    """Returns what a channel becomes during an anomaly of one channel."""
-    length = here.stop - here.start
-    if kind == "delay":
-        start = next(low for low, high in bounds if low <= here.start < high)
-        return nominal[np.maximum(np.arange(here.start, here.stop) - max(1, length // 4), start), channel]
-    first = draw_begin(bounds, [(here.start, here.stop)], length, 0, rng)
-    away = slice(first, first + length)
-    if kind == "another_time":
-        return nominal[away, channel]
-    others = np.delete(nominal, channel, axis=1).astype(np.float64)
-    centred = others - others.mean(axis=0)
-    weights, *_ = np.linalg.lstsq(centred, nominal[:, channel] - nominal[:, channel].mean(dtype=np.float64), rcond=None)
-    follows = centred @ weights
-    return (nominal[here, channel] - follows[here] + follows[away]).astype(np.float32)
+    values = {name: each["value"] for name, each in frames.items()}
+    joined = pd.DataFrame(values | {"mask": np.any([each["mask"] for each in frames.values()], axis=0)}, index=frame.index)
+    joined.attrs = frame.attrs | {"anomalies": [anomaly for each in frames.values() for anomaly in each.attrs["anomalies"]]}
+    return joined

@@ -9,17 +9,19 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.places import Place, parse_length, parse_place
 from enhsim_tf.detection.anomalies import INJECTIONS, check_kind
 
-JOINT_KINDS = ("another_time", "delay", "lost_coupling", "common_shift")
+WITHOUT_SEVERITY = ("another_time", "delay", "lost_coupling")
+JOINT_KINDS = (*WITHOUT_SEVERITY, "common_shift")
 _MOST = 10_000  # anomalies in a channel
 
 
 @dataclasses.dataclass(frozen=True)
 class InjectOptions:
-    """Settings of `inject_channel` and `inject_joint`.
+    """Settings of `inject`.
 
     Args:
         kinds: Kinds of the anomalies whose places are drawn, of `anomalies.INJECTIONS` or of `JOINT_KINDS`. They are used in turn.
-        severity: Least and greatest severity, in units of the standard deviation of the noise. Each anomaly draws its own.
+        severity: Least and greatest severity, in units of the standard deviation of the noise. Each anomaly draws its own; those of
+            `WITHOUT_SEVERITY` have none.
         length: Least and greatest length: samples, or a time such as `10min`. Each anomaly draws its own.
         number: Number of anomalies whose places are drawn. None: one of each kind.
         at: Anomalies at given places, `KIND[:SEVERITY]@BEGIN/LENGTH`. BEGIN is a sample number or a time. The severity is drawn if it
@@ -46,22 +48,12 @@ class InjectOptions:
 
     def __post_init__(self):
         low, high = self.severity
-        unknown, known = [kind for kind in self.kinds if kind not in (*INJECTIONS, *JOINT_KINDS)], ", ".join((*INJECTIONS, *JOINT_KINDS))
-        if unknown:
-            raise InputError(f"Expected kinds of anomaly among {known}. Received: {unknown[0]!r}. Name one of these.")
-        if self.is_joint and set(self.kinds) - set(JOINT_KINDS):
-            kinds = ", ".join(self.kinds)
-            raise InputError(f"Expected kinds among {', '.join(JOINT_KINDS)}. Received: {kinds}. Inject other kinds on their own.")
-        if self.is_joint and (self.at or self.noise_sd is not None):
-            raise InputError(
-                f"Expected drawn places and the estimated noise with {self.kinds[0]}. Received: --at or --noise-sd. Leave it out."
-            )
-        for kind in () if self.is_joint else self.kinds:
-            check_kind(kind, low)
+        for kind in self.kinds:
+            check_kind(kind, low, (*INJECTIONS, *JOINT_KINDS))
         if not (0 <= low <= high and (high < np.inf or low == high)):
             raise InputError(f"Expected severities from 0 on, the least first. Received: {low:g}:{high:g}.")
         if not self.kinds and not self.at:
-            raise InputError(f"Expected kinds of anomaly or places. Received: neither. Give --kinds, of {known}, or --at.")
+            raise InputError("Expected kinds of anomaly or places. Received: neither. Give --kinds, such as all, or --at.")
         if self.number is not None and (not 1 <= self.number <= _MOST or not self.kinds):
             raise InputError(f"Expected 1 to {_MOST:,} anomalies with drawn places, of given kinds. Received: number={self.number}.")
         if self.noise_sd is not None and not 0 < self.noise_sd < np.inf:

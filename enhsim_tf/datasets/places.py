@@ -1,6 +1,7 @@
-"""Scenarios, lengths, times and places of events as they are written on the command line, and shares of windows. Nothing slow is imported."""
+"""Scenarios, lengths, times and places of events as they are written on the command line. Nothing slow is imported."""
 
 import dataclasses
+import functools
 import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -19,20 +20,60 @@ _LENGTH = re.compile(
     r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?"
 )  # decimals need a unit, because a number of samples is a whole number
 _MOST_SAMPLES = 20_000_000  # of a series, which is held in memory
+_degraded = functools.lru_cache(128)(Degraded)  # thousands of windows of one scenario without a range share one object
 
 
-def parse_scenario(text: str) -> Degraded:
-    """Parses `mode:severity` or `mode:severity:onset`, such as `stuck:0.5`, with `CHANNEL=` before it for one of several channels."""
+@dataclasses.dataclass(frozen=True)
+class ScenarioRange:
+    """A degraded mode whose severity and onset are drawn for each window or event.
+
+    Args:
+        mode: One of `degraded.MODES`.
+        severity: Least and greatest severity, from 0 to 1.
+        onset: Least and greatest onset, as a share of the window or series: at least 0 and less than 1.
+        channel: The only channel that is degraded; None for all.
+
+    Raises:
+        InputError: If the mode is unknown, a number is out of range, or a range has the greater number first.
+    """
+
+    mode: str
+    severity: tuple[float, float]
+    onset: tuple[float, float] = (Degraded.onset, Degraded.onset)
+    channel: str | None = None
+
+    def __post_init__(self):
+        for severity, onset in zip(self.severity, self.onset, strict=True):
+            Degraded(self.mode, severity, onset)  # checks all three
+        if self.severity[0] > self.severity[1] or self.onset[0] > self.onset[1]:
+            raise InputError(f"Expected ranges with the lower number first. Received: {self.severity} and {self.onset}.")
+
+    def __str__(self) -> str:
+        """The mode and its severity, such as `stuck at 0.2-0.8`."""
+        return f"{self.mode} at {'-'.join(f'{limit:g}' for limit in dict.fromkeys(self.severity))}"
+
+    def draw(self, rng: np.random.Generator) -> Degraded:
+        """Draws the scenario of a window or event."""
+        return _degraded(self.mode, draw_between(self.severity, rng), draw_between(self.onset, rng), self.channel)
+
+
+def parse_scenario(text: str) -> ScenarioRange:
+    """Parses `[CHANNEL=]MODE:SEVERITY[:ONSET]`, in which both are a number or a range `low-high`, such as `volts=stuck:0.2-0.8:0.5`."""
     channel, is_named, rest = text.rpartition("=")
     mode, *numbers = rest.split(":")
     try:
-        severity, onset = map(float, numbers if len(numbers) == 2 else [*numbers, Degraded.onset])
-        return Degraded(mode, severity, onset, channel if is_named else None)
+        severity, onset = map(_limits, numbers if len(numbers) == 2 else [*numbers, str(Degraded.onset)])
+        return ScenarioRange(mode, severity, onset, channel if is_named else None)
     except ValueError:
         raise InputError(
-            f"Expected mode:severity or mode:severity:onset with numbers from 0 to 1, such as stuck:0.5, mode one of: {', '.join(MODES)}. "
-            f"Received: {text!r}."
+            "Expected MODE:SEVERITY or MODE:SEVERITY:ONSET with numbers from 0 to 1 (the onset below 1) or ranges low-high, such as stuck:0.5 "
+            f"or stuck:0.2-0.8:0.1-0.9, mode one of: {', '.join(MODES)}. Received: {text!r}."
         ) from None
+
+
+def _limits(text: str) -> tuple[float, float]:
+    numbers = [float(number) for number in re.split(r"(?<=[\d.])-", text, maxsplit=1)]  # the hyphen of 1e-3 follows a letter
+    return numbers[0], numbers[-1]
 
 
 def parse_length(text: str) -> tuple[float, str]:
@@ -134,28 +175,3 @@ def draw_between(limits: tuple[float, float], rng: np.random.Generator) -> float
     """Draws a number uniformly between two limits; if they are equal, it is that number and nothing is drawn."""
     low, high = limits
     return low if low == high else float(rng.uniform(low, high))
-
-
-@dataclasses.dataclass(frozen=True)
-class Share:
-    """A part of a training set: windows of one scenario, or nominal ones, with a random seed of their own."""
-
-    scenario: Degraded | None
-    num_windows: int
-    seed: int
-
-
-def divide_windows(scenarios: Sequence[Degraded], nominal_share: float, num_windows: int, seed: int) -> list[Share]:
-    """Divides windows between nominal telemetry and scenarios. Scenarios get equal numbers; the first ones get the remainder."""
-    if num_windows < 1:
-        raise InputError(f"Expected at least one window. Received: --windows {num_windows}.")
-    num_nominal = round(nominal_share * num_windows) if scenarios else num_windows
-    each, left = divmod(num_windows - num_nominal, len(scenarios) or 1)
-    counts = [num_nominal, *(each + (number < left) for number in range(len(scenarios)))]
-    if scenarios and nominal_share < 1 and counts[-1] == 0:
-        raise InputError(
-            f"Expected at least one window for each of {len(scenarios)} scenarios. Received: {num_windows} windows, of which a share of "
-            f"{nominal_share:g} is nominal. Ask for more windows."
-        )
-    seeds = np.random.SeedSequence(seed).generate_state(len(counts)).tolist()
-    return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]

@@ -1,14 +1,14 @@
-"""Generates one shard of a large data set. The content of a shard depends only on the plan and the number of the shard.
+"""Generates labelled windows and writes them to Parquet files: all of them to one, or each shard to a file of its own.
 
-Each shard has a random seed of its own, and enhancers always compute batches of the same size. The bytes of a shard are
+The windows of a shard depend only on the plan and the number of the shard, which has a random seed of its own. The bytes of a shard are
 therefore the same in every worker and in every order of generation.
 """
 
+import contextlib
 import functools
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -23,27 +23,7 @@ from enhsim_tf.simulator.model_folder import MANIFEST
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _STREAM = 0x666C656574  # distinguishes these seeds from all others in the package
-_START_RANGE = 1_000_000  # windows start at a random sample below this one, so that every phase of the waves occurs
-_BATCH, _BATCH_VALUES = 1_024, 2**19  # maximum windows and values per call of the enhancer
-_ROW_GROUP = 4_096
-
-
-class Record(NamedTuple):
-    """A finished shard: its number, its number of windows, and the checksum of its file."""
-
-    shard: int
-    rows: int
-    sha256: str
-
-
-class Rows(NamedTuple):
-    """Properties of the windows of a shard, one value per window. Scenario 0 is nominal."""
-
-    scenario: np.ndarray
-    severity: np.ndarray
-    onset: np.ndarray
-    start: np.ndarray
-    level: np.ndarray
+_KEY = b"settings"  # of the metadata of a file
 
 
 def shard_file(shard: int) -> str:
@@ -51,20 +31,11 @@ def shard_file(shard: int) -> str:
     return f"shard-{shard:06d}.parquet"
 
 
-def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.random.Generator]:
-    """Draws the properties of the windows of a shard. Each scenario has its share of the windows, rounded at random.
-
-    Returns:
-        The properties, the random generator of the scenarios, and the random generator of the noise.
-    """
-    seeds = np.random.SeedSequence([_STREAM, plan.seed, shard]).spawn(4)
-    mixing, placing, happening, noise = map(np.random.default_rng, seeds)
-    num_rows = plan.num_windows_in(shard)
-    scenario = systematic([plan.mix.nominal, *(part.share for part in plan.mix.scenarios)], num_rows, mixing)
-    ranges = np.array([((0, 0), (0, 0)), *((part.severity, part.onset) for part in plan.mix.scenarios)], float)[scenario]
-    severity, onset = (ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * mixing.random((num_rows, 2))).T
-    severity = severity.astype(np.float32).astype(np.float64)  # the precision of the label
-    return Rows(scenario, severity, onset, placing.integers(0, _START_RANGE, num_rows), placing.random(num_rows)), happening, noise
+def draw_scenarios(plan: Plan, shard: int) -> list[Degraded | None]:
+    """Draws the scenario of each window of a shard, None if it is nominal. Each has its share of the windows, rounded at random."""
+    rng = np.random.default_rng([_STREAM, plan.seed, shard])
+    numbers = systematic(plan.shares, plan.num_windows_in(shard), rng)
+    return [plan.scenarios[number - 1].draw(rng) if number else None for number in numbers.tolist()]
 
 
 def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator) -> np.ndarray:
@@ -74,43 +45,38 @@ def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator)
     return rng.permutation(np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1]))
 
 
-def make_windows(plan: Plan, simulator: EnhancedSimulator, shard: int) -> tuple[np.ndarray, np.ndarray, Rows]:
-    """Generates the windows of a shard with the loaded model of the plan.
+def write_windows(path: str | os.PathLike, plan: Plan, simulator: EnhancedSimulator, shards: Iterable[int] | None = None) -> None:
+    """Writes the windows of some shards to one Parquet file, chunk by chunk. The file appears only when it is complete.
 
-    Returns:
-        The windows, float32 of shape `(rows, samples, channels)`, a boolean array of the same shape that marks the changed samples, and the
-        properties of the windows.
+    A window that its scenario has not changed, such as one in which the mechanism would have stood still anyway, is labelled nominal.
+
+    Args:
+        path: Path of the file.
+        plan: The plan of the windows.
+        simulator: The model of the plan.
+        shards: Numbers of the shards. None: all of them, one after the other.
     """
-    rows, happening, noise = draw_rows(plan, shard)
-    shape = (len(rows.start), plan.window, len(plan.channels))
-    windows, masks = np.empty(shape, np.float32), np.empty(shape, bool)
-    batch = max(1, min(_BATCH, plan.shard, _BATCH_VALUES // (shape[1] * shape[2])))
-    for first in range(0, shape[0], batch):
-        here = slice(first, min(first + batch, shape[0]))
-        num_rows = here.stop - first
-        starts, scenarios = np.zeros(batch, np.int64), [_scenario_of(plan, rows, row) for row in range(first, here.stop)]
-        starts[:num_rows] = rows.start[here]
-        drawn = simulator.alignment.draw(starts, [*scenarios, *[None] * (batch - num_rows)], happening)
-        levels = None
-        if simulator.levels is not None:
-            levels = np.zeros((batch, *simulator.levels.shape[1:]))
-            levels[:num_rows] = simulator.levels[(rows.level[here] * len(simulator.levels)).astype(int)]
-        windows[here], masks[here] = (each[:num_rows] for each in simulator.complete(drawn, levels, noise))
-    return windows, masks, rows
+    about = {"format": FORMAT, _KEY: plan_key(plan.settings()), "interval_s": repr(plan.interval_s), "channel": ", ".join(plan.channels)}
+    schema = window_schema(plan.window, plan.channels).with_metadata(about)
+    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **parquet_options(schema)) as writer:
+        for shard in range(plan.num_shards) if shards is None else shards:
+            (seed,) = np.random.SeedSequence([_STREAM, plan.seed, shard, 1]).generate_state(1, np.uint64).tolist()
+            scenarios, first = draw_scenarios(plan, shard), 0
+            for windows, masks in simulator.generate_labelled_chunks(scenarios, seed):
+                some, first = scenarios[first : first + len(windows)], first + len(windows)
+                names, severities = zip(*((each.mode, each.severity) if each else (NOMINAL, 0.0) for each in some), strict=True)
+                writer.write_table(window_table(windows, masks, plan.channels, names, severities))
 
 
-def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
-    number = rows.scenario[row]
-    if number == 0:
-        return None
-    part = plan.mix.scenarios[number - 1]
-    return Degraded(part.mode, float(rows.severity[row]), float(rows.onset[row]), part.channel)
-
-
-def shard_schema(settings: dict[str, Any]) -> pa.Schema:
-    """Returns the Parquet schema of the shards of a data set, from `Plan.settings`."""
-    about = {"format": FORMAT, "settings": plan_key(settings), "interval_s": repr(settings["interval_s"])}
-    return window_schema(settings["window"], settings.get("channels", ("",))).with_metadata(about)
+def finished_shards(folder: Path, plan: Plan) -> Iterator[tuple[int, str]]:
+    """Yields number and checksum of the shards whose files are there and have the key and the number of windows of the plan."""
+    key = plan_key(plan.settings()).encode()
+    for shard in range(plan.num_shards):
+        path = folder / shard_file(shard)
+        with contextlib.suppress(OSError, pa.ArrowException):  # no file, or one that is damaged
+            file = pq.read_metadata(path)
+            if (file.metadata or {}).get(_KEY) == key and file.num_rows == plan.num_windows_in(shard):
+                yield shard, sha256(path)
 
 
 class ShardMaker:
@@ -133,12 +99,8 @@ class ShardMaker:
             raise InputError(f"Expected the same model as at the start of the data set. Received: another model in {self.plan.folder}.")
         return simulator
 
-    def __call__(self, shard: int) -> Record:
-        """Generates a shard, writes its file atomically, and returns its record."""
-        windows, masks, rows = make_windows(self.plan, self.simulator, shard)
-        modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
-        table, path = window_table(windows, masks, self.plan.channels, modes[rows.scenario], rows.severity), self.folder / shard_file(shard)
-        with replace_file(path) as temporary:
-            schema = shard_schema(self.settings)
-            pq.write_table(table.cast(schema), temporary, row_group_size=_ROW_GROUP, **parquet_options(schema))
-            return Record(shard, table.num_rows, sha256(temporary))
+    def __call__(self, shard: int) -> tuple[int, str]:
+        """Generates a shard, writes its file atomically, and returns its number and the checksum of the file."""
+        path = self.folder / shard_file(shard)
+        write_windows(path, self.plan, self.simulator, [shard])
+        return shard, sha256(path)

@@ -2,17 +2,14 @@
 
 The severity of an anomaly is stated in units of the standard deviation of the noise. Each kind is a function of the samples to change, shape
 `(windows, duration)`, the severity in the unit of the telemetry, the mean of each whole window, shape `(windows, 1)`, and a random number
-generator; it returns the changed samples. `inject` changes each of many windows, `inject_anomalies` one series in parts.
+generator; it returns the changed samples. `inject` changes each of many windows, `datasets.inject` a series.
 """
 
-import dataclasses
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.placing import PlacedEvent, in_order, place_events
 
 SEVERITIES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the experiments, in units of the standard deviation of the noise
 DURATIONS = (25, 100, 250)  # of the experiments, in samples
@@ -88,10 +85,10 @@ INJECTIONS: dict[str, Callable[[np.ndarray, float, np.ndarray, np.random.Generat
 """Maps each kind of anomaly to the function that changes the samples."""
 
 
-def check_kind(kind: str, severity: float) -> None:
+def check_kind(kind: str, severity: float, known: Collection[str] = INJECTIONS) -> None:
     """Raises InputError if a kind is unknown, or its severity is not a number of at least 0; only `stuck` may be infinite."""
-    if kind not in INJECTIONS:
-        raise InputError(f"Expected a kind of anomaly, one of: {', '.join(INJECTIONS)}. Received: {kind!r}. Name one of these.")
+    if kind not in known:
+        raise InputError(f"Expected a kind of anomaly, one of: {', '.join(known)}. Received: {kind!r}. Name one of these.")
     if not severity >= 0 or (severity == np.inf and kind != "stuck"):
         raise InputError(f"Expected a severity of 0 or more, which may be infinite only for stuck. Received: {kind} at {severity}.")
 
@@ -116,15 +113,9 @@ def inject(
     if not 1 <= duration <= windows.shape[1]:
         raise InputError(f"Expected a duration of 1 to {windows.shape[1]} samples. Received: duration={duration}.")
     begins = rng.integers(0, windows.shape[1] - duration + 1, len(windows))
-    return put_anomalies(windows, np.arange(len(windows))[:, None], begins[:, None] + np.arange(duration), kind, severity * noise_sd, rng)
-
-
-def put_anomalies(
-    windows: np.ndarray, rows: np.ndarray, columns: np.ndarray, kind: str, size: float, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """Changes the samples at `columns` of the windows `rows`; returns the changed windows and the mask, as `inject`."""
-    means = np.mean(windows, axis=1, dtype=np.float64)
-    pieces = INJECTIONS[kind](np.asarray(windows[rows, columns], np.float64), size, means[rows], rng)
+    rows, columns = np.arange(len(windows))[:, None], begins[:, None] + np.arange(duration)
+    means = np.mean(windows, axis=1, dtype=np.float64, keepdims=True)
+    pieces = INJECTIONS[kind](np.asarray(windows[rows, columns], np.float64), severity * noise_sd, means, rng)
     anomalous, mask = np.array(windows, np.float32), np.zeros(windows.shape, bool)
     step = SPIKE_INTERVAL if kind == "spike" else 1  # the samples between spikes are nominal
     anomalous[rows, columns[:, ::step]], mask[rows, columns[:, ::step]] = pieces[:, ::step], True
@@ -144,62 +135,3 @@ def estimate_noise_sd(parts: Sequence[np.ndarray]) -> float:
         return 0.0
     robust = _NORMAL_MAD * np.median(np.abs(differences))
     return float((robust or np.sqrt(np.mean(differences**2))) / np.sqrt(6))
-
-
-def inject_anomalies(
-    parts: Sequence[np.ndarray],
-    given: Sequence[PlacedEvent],
-    drawn: Sequence[tuple[str, float, int]],
-    noise_sd: float,
-    gap: int,
-    rng: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray, list[PlacedEvent]]:
-    """Injects anomalies into a series. They do not overlap, and none extends over a gap of the series.
-
-    Drawn anomalies are placed by `placing.place_events`: `stuck`, for example, changes nothing where the telemetry is constant.
-
-    Args:
-        parts: The nominal series, or the parts between its gaps, each of shape `(samples,)`.
-        given: Anomalies at given places, with severities in units of `noise_sd`. Samples are counted over all parts.
-        drawn: Kind, severity and length of each anomaly whose place is drawn.
-        noise_sd: Standard deviation of the noise, in the unit of the series.
-        gap: Least number of samples between a drawn anomaly and any other.
-        rng: Random number generator.
-
-    Returns:
-        The float32 series of all parts, a boolean array that marks exactly the changed samples, both of shape `(samples,)`, and the
-        anomalies in the order of time, with `begin` and `length` of the samples that have changed.
-
-    Raises:
-        InputError: If anomalies overlap, lie outside a part, do not fit, or change no sample.
-    """
-    bounds = list(itertools.pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
-    nominal = np.concatenate([np.asarray(part, np.float32) for part in parts])
-    values = nominal.copy()
-    found: list[PlacedEvent] = []
-
-    def changes(event: PlacedEvent) -> bool:
-        """Puts an anomaly into the series; whether it has changed a sample."""
-        check_kind(event.kind, event.severity)
-        start, stop = next(each for each in bounds if each[0] <= event.begin < each[1])
-        here, columns = slice(event.begin, event.end), np.arange(event.begin - start, event.end - start)[None]
-        with np.errstate(over="ignore"):
-            changed, _ = put_anomalies(
-                nominal[None, start:stop], np.zeros((1, 1), int), columns, event.kind, event.severity * noise_sd, rng
-            )
-        values[here] = changed[0, columns[0]]
-        if not np.isfinite(values[here]).all():
-            raise InputError(f"Expected anomalies within the range of float32. Received: {event}. Choose a lower severity.")
-        places = np.flatnonzero(values[here] != nominal[here])
-        if len(places):
-            found.append(dataclasses.replace(event, begin=event.begin + int(places[0]), length=int(places[-1] - places[0]) + 1))
-        return len(places) > 0
-
-    for event in in_order(given, bounds):
-        if not changes(event):
-            raise InputError(
-                f"Expected an anomaly that changes the telemetry. Received: {event}, which changes no sample. "
-                "Choose another place, a longer one or a higher severity."
-            )
-    place_events(given, drawn, bounds, gap, changes, rng)
-    return values, values != nominal, sorted(found, key=lambda each: each.begin)

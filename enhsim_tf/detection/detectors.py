@@ -9,8 +9,6 @@ single channel may do without its axis. `registry` lists all detectors by name.
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.common.two_sample import window_features
-
 _WIDTH = 25  # samples of a moving deviation
 _BOUND = 1.5  # largest factor by which the scale of nominal residuals may grow
 _MEMORY = 64  # past windows whose median size is followed: eight windows that share no sample, at eight windows a length
@@ -22,11 +20,6 @@ _MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` 
 def flat(windows: np.ndarray) -> np.ndarray:
     """Windows with the channels one after the other, shape `(windows, channels * samples)`."""
     return windows.swapaxes(1, -1).reshape(len(windows), -1)
-
-
-def features(windows: np.ndarray) -> np.ndarray:
-    """The features of `window_features` of each channel."""
-    return window_features(windows.swapaxes(1, -1).reshape(-1, windows.shape[1])).reshape(len(windows), -1)
 
 
 class LimitCheck:
@@ -63,24 +56,6 @@ class PCAResidual:
         windows = flat(windows)
         with threadpool_limits(1):
             return np.mean((windows - self._pca.inverse_transform(self._pca.transform(windows))) ** 2, axis=1)
-
-
-class IsolationForestOnFeatures:
-    """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`."""
-
-    def __init__(self, seed: int = 0):
-        self.seed = seed
-
-    def fit(self, windows: np.ndarray) -> "IsolationForestOnFeatures":
-        """Fits the forest to nominal windows."""
-        from sklearn.ensemble import IsolationForest
-
-        self._forest = IsolationForest(n_estimators=200, random_state=self.seed).fit(features(windows))
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the anomaly score of the forest."""
-        return -self._forest.score_samples(features(windows))
 
 
 class JointMeans:

@@ -24,7 +24,6 @@ def _make(kind: str, seed: int) -> Any:
 DETECTORS: dict[str, Callable[[int], Any]] = {
     "limit check": partial(_make, "LimitCheck"),
     "PCA residual": partial(_make, "PCAResidual"),
-    "isolation forest": partial(_make, "IsolationForestOnFeatures"),
     "innovation": partial(_make, "Innovation"),
     "largest step": partial(_make, "LargestStep"),
     "moving deviation": partial(_make, "MovingDeviation"),

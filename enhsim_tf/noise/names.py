@@ -1,6 +1,3 @@
 """Names of the noise models that a fit offers. This module imports nothing, so that the command line can list them."""
 
-CANDIDATES = ("none", "gaussian", "autoregression", "residual windows", "matched residual windows")
-"""The noise models, the simplest first."""
-BEST = "best"
-"""The option with which held-out telemetry chooses among the candidates."""
+NONE, RESIDUAL_WINDOWS, MATCHED = NOISES = ("none", "residual windows", "matched residual windows")

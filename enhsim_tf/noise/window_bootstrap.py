@@ -1,120 +1,110 @@
-"""Resampled residuals: noise models that draw whole windows of real noise (baselines of section 2.3)."""
+"""Noise models that draw whole windows of real noise again (an extension of section 2.3)."""
 
 import functools
 import math
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.noise.names import MATCHED, NOISES, NONE, RESIDUAL_WINDOWS
 
 _NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over these segments
 _EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
 _BATCH = 2**19  # distances that are computed at a time, few enough for a processor's cache
 _MOST_LANDMARKS = 2_500  # stored signals whose neighbours are found, which bounds the time
-_LAST_START = 2**60  # the end of a window is still an integer of 64 bits
+
+
+class NoiseModel(Protocol):
+    """What every noise model can do."""
+
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws noise for `number` windows; `signal` is the enhanced signal of the same shape, in the telemetry's unit."""
+
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws one series of noise; `signal` is the enhanced signal of the same shape."""
+
+
+def fit_noise(name: str, noise: np.ndarray, signal: np.ndarray) -> "WindowBootstrap":
+    """Fits a noise model, one of `names.NOISES`, to windows of noise and the enhanced signal below, `(windows, samples, channels)`."""
+    if name == NONE:
+        return WindowBootstrap(np.zeros_like(noise[:1]))
+    if name == RESIDUAL_WINDOWS:
+        return WindowBootstrap(noise)
+    if name == MATCHED:
+        return WindowBootstrap.fit(noise, signal)
+    raise InputError(f"Expected a noise model among {', '.join(NOISES)}. Received: {name!r}.")
 
 
 class WindowBootstrap:
-    """Draws whole windows of real noise.
+    """Draws whole windows of real noise again, with replacement (Efron 1979), of all channels together, which keeps their cross-correlation.
 
-    A call first draws windows that share no sample with those it drew before, because a classifier recognises what it has seen. When none is
-    left, all are drawn with replacement (Efron 1979). All channels are drawn together, so their cross-correlation is that of the real noise.
+    The noise of many sensors depends on what they measure, and so do the errors of the enhancer that residuals contain. If the signals below
+    the windows are given, a window is drawn from those whose signals are nearest to the one that the noise is added to: as many as the square
+    root of the number of all windows (Lall and Sharma 1996), and all whose signal is the same. The distance of two signals is that of their
+    means over 64 segments. The neighbours of a signal are those of the stored signal nearest to it. If the signal never repeats, these can be
+    few stretches of the record.
 
-    A longer series consists of windows that overlap by a quarter and are cross-faded with a sine and a cosine. The squares of these
-    weights add up to one, which preserves the variance of windows that are uncorrelated. The mean of all windows is not faded.
+    A longer series consists of windows that overlap by a quarter and are cross-faded. What the neighbours have in common has weights that add
+    up to one, the rest a sine and a cosine, whose squares do, so that the variance of uncorrelated windows stays.
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
-        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
+        signals: Means of the signal below each window over segments, shape `(windows, segments)`; see `fit`. None: the signal has no effect.
     """
 
-    def __init__(self, windows: np.ndarray, starts: np.ndarray | None = None):
-        self.windows, self.starts = _checked(windows, starts)
-
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows, float32 of shape `(number, samples, channels)`. The signal has no effect."""
-        sparing, drawn = _Sparing(self.starts, *self.windows.shape[:2]), []
-        for candidate in rng.permutation(len(self.windows)).tolist():
-            if len(drawn) == number:
-                break
-            if sparing.is_free[candidate]:
-                sparing.take(candidate)
-                drawn.append(candidate)
-        again = rng.integers(0, len(self.windows), number - len(drawn))
-        return self.windows[np.concatenate([np.array(drawn, np.int64), again])]
-
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws a series of any length without seams, float32 of shape `(num_samples, channels)`. The signal has no effect."""
-        mean = np.mean(self.windows, axis=(0, 1), dtype=np.float64)
-        return _cross_faded(self.windows.shape[1], num_samples, rng, lambda starts: (self.generate(len(starts), rng), mean))
-
-
-class MatchedWindowBootstrap:
-    """Draws whole windows of real noise whose signal is similar to the one that the noise is added to.
-
-    The noise of many sensors depends on what they measure, and so do the errors of the enhancer that residuals contain. A window is drawn,
-    as by `WindowBootstrap`, from those with the nearest signals: as many as the square root of the number of all windows (Lall and Sharma
-    1996), and all whose signal is the same. The distance of two signals is that of their means over 64 segments. The neighbours of a
-    signal are those of the stored signal nearest to it. If the signal never repeats, these can be few stretches of the record.
-
-    In a longer series, the mean of the neighbours is cross-faded with weights that add up to one, and the rest as by `WindowBootstrap`.
-
-    Args:
-        windows: As for `WindowBootstrap`.
-        signals: Means of the signal below each window over segments, shape `(windows, segments)`; see `fit`.
-        starts: As for `WindowBootstrap`.
-    """
-
-    def __init__(self, windows: np.ndarray, signals: np.ndarray, starts: np.ndarray | None = None):
-        (self.windows, self.starts), self.signals = _checked(windows, starts), np.asarray(signals, np.float32)
-        expected = (len(self.windows), min(_NUM_SEGMENTS, self.windows.shape[1]) * math.prod(self.windows.shape[2:]))
-        if self.signals.shape != expected or not np.isfinite(self.signals).all():
+    def __init__(self, windows: np.ndarray, signals: np.ndarray | None = None):
+        self.windows, self.signals = np.asarray(windows, np.float32), None if signals is None else np.asarray(signals, np.float32)
+        shape = self.windows.shape
+        if len(shape) not in (2, 3) or shape[0] < 1 or shape[1] < 4 or not np.isfinite(self.windows).all():
+            raise InputError(f"Expected finite windows of noise of at least 4 samples. Received: shape {shape}. Extract noise first.")
+        expected = (len(windows), min(_NUM_SEGMENTS, shape[1]) * math.prod(shape[2:]))
+        if self.signals is not None and not (self.signals.shape == expected and np.isfinite(self.signals).all()):
             raise InputError(f"Expected the finite signal of each window, shape {expected}. Received: shape {self.signals.shape}.")
 
     @classmethod
-    def fit(cls, windows: np.ndarray, signal: np.ndarray, starts: np.ndarray | None = None) -> "MatchedWindowBootstrap":
-        """Stores windows of noise, the signal below them, of the same shape, and where they start."""
-        return cls(windows, _segment_means(signal, np.shape(windows)), starts)
+    def fit(cls, windows: np.ndarray, signal: np.ndarray) -> "WindowBootstrap":
+        """Stores windows of noise and the signal below them, of the same shape, which the noise follows."""
+        return cls(windows, _segment_means(signal, np.shape(windows)))
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows, float32 of the shape of `signal`, the signal that the noise is added to, in the unit of the fit."""
+        """Draws windows, float32 of shape `(number, samples, channels)`; `signal` is what the noise is added to, in the unit of the fit."""
         return self.windows[self._draw(self._nearest(signal, number), rng)]
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws a series of any length without seams, float32 of the shape of `signal`: `(num_samples, channels)`; see `generate`."""
-        window, signal = self.windows.shape[1], _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(np.float32)
+        """Draws a series of any length without seams, float32 of shape `(num_samples, channels)`; see `generate`."""
+        window, follows = self.windows.shape[1], self.signals is not None
+        if follows:
+            signal = _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(np.float32)
 
         def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            near = self._nearest(signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)], len(starts))
+            below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)] if follows else None
+            near = self._nearest(below, len(starts))
             used, place = np.unique(near, return_inverse=True)
-            means = np.stack([self.windows[self._neighbours.of[each]].mean(axis=0) for each in used])
+            means = np.stack([self.windows[self._groups[each]].mean(axis=0) for each in used])
             return self.windows[self._draw(near, rng)], means[place]
 
         return _cross_faded(window, num_samples, rng, draw)
 
     def _nearest(self, signal: np.ndarray | None, number: int) -> np.ndarray:
+        if self.signals is None:
+            return np.zeros(number, np.int64)
         signal = _checked_signal(signal, (number, *self.windows.shape[1:]))
         with threadpool_limits(1):  # several threads take longer for products of this size
             return self._neighbours.nearest(signal.reshape(*signal.shape[:2], -1))
 
     def _draw(self, near: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Draws one of the neighbours of each landmark, one that shares no sample with those drawn before if there is one."""
-        neighbours, sparing = self._neighbours.of, _Sparing(self.starts, *self.windows.shape[:2])
-        sizes = np.array([len(some) for some in neighbours])
-        begins, places = np.cumsum(sizes) - sizes, rng.random(len(near))
-        chosen, spent = np.concatenate(neighbours)[begins[near] + (places * sizes[near]).astype(int)], set()
-        for row, landmark in enumerate(near.tolist()):
-            if landmark in spent:
-                continue
-            free = neighbours[landmark][sparing.is_free[neighbours[landmark]]]
-            if len(free):
-                chosen[row] = free[int(places[row] * len(free))]
-                sparing.take(chosen[row])
-            else:
-                spent.add(landmark)  # what was drawn is never free again
-        return chosen
+        """Draws one of the neighbours of each landmark."""
+        sizes = np.array([len(some) for some in self._groups])
+        begins, places = np.cumsum(sizes) - sizes, (rng.random(len(near)) * sizes[near]).astype(np.int64)
+        return np.concatenate(self._groups)[begins[near] + places]
+
+    @property
+    def _groups(self) -> list[np.ndarray]:
+        """The numbers of the windows among which is drawn at each landmark."""
+        return [np.arange(len(self.windows))] if self.signals is None else self._neighbours.of
 
     @functools.cached_property
     def _neighbours(self) -> "_Neighbours":
@@ -169,37 +159,6 @@ def _nearest_of(places: np.ndarray, known: np.ndarray, equal: float) -> list[np.
         reach = np.take_along_axis(apart, near, axis=1).max(axis=1)
         found += [own if far > equal else np.flatnonzero(row <= equal) for own, far, row in zip(near, reach, apart, strict=True)]
     return found
-
-
-class _Sparing:
-    """Which windows share no sample with those that were drawn before, given their starts; None: no two windows overlap."""
-
-    def __init__(self, starts: np.ndarray | None, number: int, window: int):
-        starts = window * np.arange(number) if starts is None else starts
-        self.is_free, self._order = np.ones(number, bool), np.argsort(starts, kind="stable")
-        apart = ((starts - window, "right"), (starts + window, "left"))
-        self._first, self._last = (np.searchsorted(starts[self._order], edge, side) for edge, side in apart)
-
-    def take(self, chosen: int) -> None:
-        """Notes that a window was drawn."""
-        self.is_free[self._order[self._first[chosen] : self._last[chosen]]] = False
-
-
-def _checked(windows: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-    """Returns windows of noise as float32, and where they start as integers."""
-    windows = np.asarray(windows, np.float32)
-    if windows.ndim not in (2, 3) or windows.shape[0] < 1 or windows.shape[1] < 4 or not np.isfinite(windows).all():
-        raise InputError(f"Expected finite windows of noise of at least 4 samples. Received: shape {windows.shape}. Extract noise first.")
-    if starts is None:
-        return windows, None
-    starts = np.asarray(starts)
-    if starts.shape != windows.shape[:1] or starts.dtype.kind not in "iu" or not 0 <= starts.min() <= starts.max() <= _LAST_START:
-        span = f", from {starts.min()} to {starts.max()}" if starts.size and starts.dtype.kind in "iuf" else ""
-        raise InputError(
-            f"Expected the starts of {len(windows)} windows of noise, a whole number from 0 to {_LAST_START} for each. "
-            f"Received: shape {starts.shape} of {starts.dtype}{span}. Give the first sample of each window."
-        )
-    return windows, starts.astype(np.int64)
 
 
 def _checked_signal(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:

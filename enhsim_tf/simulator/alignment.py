@@ -9,7 +9,6 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.degraded import Degraded, held_samples
-from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import pair_recordings
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
@@ -49,15 +48,17 @@ class Waves:
         self.simulators, self.channels = tuple(simulators), tuple(channels)
         self.interval_s, self.window = float(interval_s), int(window)
         self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
-        known = [each.shape for each in self.waveforms if each is not None]
-        if any(shape != (_NUM_PHASES, self.window) for shape in known):
-            raise InputError(f"Expected waveforms of shape {(_NUM_PHASES, self.window)}. Received: {known}. Learn them at all phases.")
         self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the coarse columns: one for each channel."""
         return tuple(f"{simulator.columns[0]} of {name}" for simulator, name in zip(self.simulators, self.channels, strict=True))
+
+    @property
+    def longest_period(self) -> float:
+        """The longest period of a wave in samples; 0 if nothing is periodic."""
+        return max((each.waves[0].period_s for each in self.simulators if not each.is_constant), default=0.0) / self.interval_s
 
     def phases(self, channel: int) -> np.ndarray:
         """Coarse windows of a channel at all phases of its period, float32 of shape `(phases, samples)`."""
@@ -123,24 +124,28 @@ class Waves:
                 rows_of.setdefault(scenario, []).append(row)
         nominal = np.concatenate([self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2)
         changes = [(channel, rows, scenario, 0, self.window) for scenario, rows in rows_of.items() for channel in self._concerned(scenario)]
-        return self._degraded(nominal, self._times(starts), changes, rng) if changes else Drawn(nominal, nominal)
+        return self._degraded(nominal, starts, changes, rng) if changes else Drawn(nominal, nominal)
 
     def draw_series(self, num_samples: int, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
         """Simulates one coarse series, as a single window of `num_samples`; each event is a mode, its first sample and its end."""
         times, numbers = (self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
         nominal = np.stack([self._in_unit(channel, self.simulators[channel].simulate(times)) for channel in numbers], axis=2)
         changes = [(channel, [0], *event) for channel in numbers for event in events if channel in self._concerned(event[0])]
-        return self._degraded(nominal, times, changes, rng)
+        return self._degraded(nominal, np.zeros(1, int), changes, rng)
 
     def _degraded(
-        self, nominal: np.ndarray, times: np.ndarray, changes: Sequence[tuple[int, list[int], Degraded, int, int]], rng: np.random.Generator
+        self,
+        nominal: np.ndarray,
+        starts: np.ndarray,
+        changes: Sequence[tuple[int, list[int], Degraded, int, int]],
+        rng: np.random.Generator,
     ) -> Drawn:
         """Puts degraded modes into coarse windows; each change is a channel, its windows, the mode, its first sample and its end."""
         coarse, is_stuck = nominal.copy(), False
         held = np.broadcast_to(np.arange(nominal.shape[1])[:, None], nominal.shape).copy()
         for channel, rows, scenario, begin, end in changes:
-            values = self.simulators[channel].simulate(times[rows, begin:end], scenario, rng)
-            coarse[rows, begin:end, channel] = self._in_unit(channel, values)
+            times = self.interval_s * (starts[rows][:, None] + np.arange(begin, end))
+            coarse[rows, begin:end, channel] = self._in_unit(channel, self.simulators[channel].simulate(times, scenario, rng))
             stuck = held_samples(scenario, end - begin)
             if stuck is not None:
                 held[rows, begin + stuck[0] : begin + stuck[1], channel], is_stuck = begin + stuck[0], True
@@ -180,8 +185,7 @@ class Runs:
         nominal: The nominal run of the fit, whose columns are the inputs of the enhancer.
         window: Length of a window in samples.
         delay_s: How much later the telemetry is than the coarse run, in seconds.
-        coarse: The coarse simulator, or None if only a recorded run is known. Its code is not saved.
-        name: Name of the coarse simulator.
+        name: Name of the coarse simulator. Empty: that of the run.
         commands: The traces, if the run are commands of the telemetry's own file.
     """
 
@@ -190,12 +194,11 @@ class Runs:
         nominal: Recording,
         window: int,
         delay_s: float = 0.0,
-        coarse: CoarseSimulator | None = None,
         name: str = "",
         commands: CommandTraces | None = None,
     ):
-        self.nominal, self.window, self.delay_s, self.coarse = nominal, int(window), float(delay_s), coarse
-        self.name, self.commands = name or (name_of(coarse) if coarse is not None else nominal.name), commands
+        self.nominal, self.window, self.delay_s = nominal, int(window), float(delay_s)
+        self.name, self.commands = name or nominal.name, commands
 
     @property
     def columns(self) -> tuple[str, ...]:

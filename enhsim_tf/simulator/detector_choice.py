@@ -17,7 +17,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.detection import metrics
-from enhsim_tf.simulator.noise_choice import anomalous_windows
+from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.scoring import Scorer
 from enhsim_tf.simulator.simulator import EnhancedSimulator
@@ -73,7 +73,7 @@ def judge_detectors(simulator: EnhancedSimulator, held_out: Recording, run: Reco
     below = np.zeros_like(clean) if run is None else clean
     some = np.linspace(0, len(windows) - 1, min(_NUM_ANOMALOUS, len(windows))).astype(int)
     unit = np.where(simulator.noise_sd > 0, simulator.noise_sd, simulator.scale)
-    anomalous = {key: each - below[some] for key, each in anomalous_windows(windows[some], unit, seed, SEVERITIES).items()}
+    anomalous = {key: each - below[some] for key, each in anomalous_windows(windows[some], unit, seed).items()}
     if len(simulator.channels) > 1:
         relations = relation_anomalies(windows, clean, np.random.default_rng([seed, 17]))
         anomalous |= {key: each - below for key, each in relations.items()}
@@ -94,6 +94,23 @@ def judge_detectors(simulator: EnhancedSimulator, held_out: Recording, run: Reco
         by_kind = {kind: float(np.mean(each)) for kind, each in recalls.items()}
         recall = float(np.mean([each for kind, each in by_kind.items() if kind not in RELATIONS]))
         found.append(JudgedDetector(name, float(flags.mean()), allowed, recall, by_kind))
+    return found
+
+
+def anomalous_windows(
+    nominal: np.ndarray, noise_sd: np.ndarray, seed: int, severities: Sequence[float] = SEVERITIES
+) -> dict[tuple[str, float], np.ndarray]:
+    """Injects anomalies of every kind and severity, in units of the noise of each channel, into one channel of each window; durations alternate."""
+    durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
+    found = {}
+    for kind in INJECTIONS:
+        for severity in severities:
+            windows = found[kind, severity] = nominal.copy()
+            for place, duration in enumerate(durations):
+                rows, rng = np.arange(place, len(windows), len(durations)), np.random.default_rng([seed, place])
+                channel = rng.integers(0, windows.shape[2], len(rows))
+                unit = noise_sd[channel][:, None]
+                windows[rows, :, channel] = inject(windows[rows, :, channel] / unit, kind, severity, duration, 1.0, rng)[0] * unit
     return found
 
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,12 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, choose_enhancer, fit_enhancer, split_fold
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
-from enhsim_tf.noise.names import BEST as BEST_NOISE
+from enhsim_tf.noise.names import MATCHED, RESIDUAL_WINDOWS
+from enhsim_tf.noise.window_bootstrap import fit_noise
 from enhsim_tf.simulator.alignment import Runs, Waves
 from enhsim_tf.simulator.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse
 from enhsim_tf.simulator.detector_choice import choose_detector, judge_detectors
 from enhsim_tf.simulator.joint import join_channels, long_enough, split_end, telemetry_of, times_of, windows_of
-from enhsim_tf.simulator.noise_choice import JUDGED_SHARE, NoiseWindows, choose_noise
 from enhsim_tf.simulator.options import LEAST_LEARNT, FitOptions, default_window
 from enhsim_tf.simulator.report import Report, make_report
 from enhsim_tf.simulator.simulator import EnhancedSimulator
@@ -177,17 +177,11 @@ def _fit_aligned(
     step = max(1.0, (places[-1] - places[0]) / max(1, len(places) - 1))
     levels = np.stack([shift, gain], axis=2)[followed]
     simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, levels=levels, nominal=learnt, level_step=step)
-    period = max((each.waves[0].period_s for each in waves.simulators if not each.is_constant), default=0.0) / learnt.interval_s
-    notes = [_SHORT.format(window, period)] if window < period else []
+    notes = [_SHORT.format(window, waves.longest_period)] if window < waves.longest_period else []
 
-    def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
-        windows = windows_of(some, places, window)
-        clean = simulator.enhance(*waves.align(windows))
-        return NoiseWindows(windows - clean, clean, times_of(some, places, window))
-
-    everything = noise_windows(learnt, random_window_starts(learnt.parts, window, number, np.random.default_rng([options.seed, 1])))
-    halves = [_evenly(each, window, number, noise_windows) for each in split_end(learnt, JUDGED_SHARE)]
-    return _finish(simulator, choice, halves, everything, options, held_out, None, said, notes, progress)
+    some = windows_of(learnt, random_window_starts(learnt.parts, window, number, np.random.default_rng([options.seed, 1])), window)
+    clean = simulator.enhance(*waves.align(some))
+    return _finish(simulator, choice, some - clean, clean, options, held_out, None, said, notes, progress)
 
 
 def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tuple[Waves, np.ndarray, np.ndarray, np.ndarray]:
@@ -250,17 +244,12 @@ def _fit_runs(
     starts = evenly_spaced_starts(learnt.parts, window, number)
     (inputs, targets), times = (windows_of(each, starts, window) for each in (learnt_run, learnt)), times_of(learnt, starts, window)
     choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, progress)
-    known = None if isinstance(coarse, Recording) else coarse
-    alignment = Runs(learnt_run, window, delay.seconds, known, name_of(coarse), commands)
+    alignment = Runs(learnt_run, window, delay.seconds, name_of(coarse), commands)
     simulator = EnhancedSimulator(alignment, choice.enhancer, None, recording.columns, recording.interval_s, nominal=learnt)
     residuals = _held_out_residuals(simulator, choice, inputs, targets, times, options)
 
-    def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
-        noise, clean = np.split(windows_of(some, places, window), 2, axis=2)
-        return NoiseWindows(noise, clean, times_of(some, places, window))
-
-    everything, *halves = (_evenly(some, window, number, noise_windows) for some in (residuals, *split_end(residuals, JUDGED_SHARE)))
-    return _finish(simulator, choice, halves, everything, options, held_out, held_out_run, said, [*notes, *left_out], progress)
+    noise, clean = np.split(windows_of(residuals, evenly_spaced_starts(residuals.parts, window, number), window), 2, axis=2)
+    return _finish(simulator, choice, noise, clean, options, held_out, held_out_run, said, [*notes, *left_out], progress)
 
 
 def _run_of(coarse: CoarseSimulator, recording: Recording) -> tuple[Recording, list[str]]:
@@ -305,7 +294,7 @@ def _without_constant(run: Recording) -> tuple[Recording, list[str]]:
 
 def _held_out_residuals(
     simulator: EnhancedSimulator, choice: Choice, inputs: np.ndarray, targets: np.ndarray, times: np.ndarray, options: FitOptions
-) -> Recording | None:
+) -> Recording:
     """Returns residual and enhanced run of all blocks of time, side by side, each from an enhancer that was not fitted to that block.
 
     Residuals of the telemetry that an enhancer has learnt from are too small, because it has learnt part of their noise.
@@ -327,18 +316,13 @@ def _held_out_residuals(
                     clean = other.enhance_run(coarse.values[low:high])
                     both = np.concatenate([part.values[low:high] - clean, clean], axis=1)
                     found.append(Run(both, (first + low) * learnt.interval_s))
+    if not found:
+        raise InputError(
+            f"Expected stretches of at least a window of {window} samples without a gap. Received: none in any of {len(choice.edges) - 1} blocks of "
+            "time. Give longer runs or a smaller --window."
+        )
     columns = tuple(f"{what} of {name}" for what in ("residual", "enhanced run") for name in learnt.columns)
-    return dataclasses.replace(learnt, parts=tuple(sorted(found, key=lambda each: each.offset_s)), columns=columns) if found else None
-
-
-def _evenly(
-    recording: Recording | None, window: int, number: int, windows_at: Callable[[Recording, np.ndarray], NoiseWindows]
-) -> NoiseWindows:
-    """Windows of noise that are evenly spaced over a recording; none if it has no part that is long enough."""
-    usable = long_enough(recording, window)
-    if usable is None:
-        return NoiseWindows(*np.zeros((2, 0, window, 1), np.float32), np.zeros(0, int))
-    return windows_at(usable, evenly_spaced_starts(usable.parts, window, number))
+    return dataclasses.replace(learnt, parts=tuple(sorted(found, key=lambda each: each.offset_s)), columns=columns)
 
 
 # both
@@ -347,8 +331,8 @@ def _evenly(
 def _finish(
     simulator: EnhancedSimulator,
     choice: Choice,
-    halves: Sequence[NoiseWindows],
-    everything: NoiseWindows,
+    noise: np.ndarray,
+    clean: np.ndarray,
     options: FitOptions,
     held_out: Recording | None,
     held_out_run: Recording | None,
@@ -356,40 +340,26 @@ def _finish(
     notes: list[str],
     progress: Progress,
 ) -> tuple[EnhancedSimulator, Report]:
-    """Fits the noise and chooses the detector. What held-out time contradicts is not shipped: the next noise model is taken then."""
+    """Fits the noise to windows of it and the enhanced signal below them, and chooses the detector by held-out time."""
     learnt, run = simulator.nominal, simulator.nominal_run
     simulator.quantisation = tuple(map(Levels.find, learnt.values.T))
     progress.step("noise")
-    is_there = bool(np.std(everything.noise, dtype=np.float64) > 0)  # noise of size 0 cannot be judged
-    rows: list[dict[str, Any]] = []
-    used = options.noise if options.noise != BEST_NOISE else "residual windows"
-    if options.noise != BEST_NOISE or not is_there:
-        simulator.noise = everything.fit(used)
-    else:
-        simulator.noise, rows, noted = choose_noise(*halves, everything, options.seed, simulator.quantisation, run is None)
-        used = next((row["name"] for row in rows if row["is_chosen"]), used)
-        notes += noted
+    name = options.noise or (MATCHED if run is None else RESIDUAL_WINDOWS)  # the signal of a run seldom repeats: its neighbours are few
+    simulator.noise = fit_noise(name, noise, clean)
     progress.step("detectors")
     judged_on, judged_run = (learnt, run) if held_out is None else (held_out, held_out_run)
     detectors = judge_detectors(simulator, judged_on, judged_run, options.seed)
     chosen = choose_detector(detectors)
-    if not chosen.keeps and options.noise == BEST_NOISE and used not in ("residual windows", "matched residual windows"):
-        notes.append(f"noise model {used} is not used, because held-out time contradicts it; whole residual windows are drawn")
-        simulator.noise, used = everything.fit("residual windows"), "residual windows"
-        for name in ("noise_sd", "scale"):
-            vars(simulator).pop(name, None)
-        detectors = judge_detectors(simulator, judged_on, judged_run, options.seed)
-        chosen = choose_detector(detectors)
     simulator.trained = {
         "telemetry": learnt.name,
         "num_samples": len(learnt),
         "options": dataclasses.asdict(options),
-        "noise": used,
+        "noise": name,
         "detector": chosen.name,
         "keeps_promise": bool(chosen.keeps),
         "false_alarms": chosen.false_alarms,
     }
-    report = make_report(simulator, choice, rows, detectors, judged_on, judged_run, held_out is not None, said, notes, options.seed)
+    report = make_report(simulator, choice, detectors, judged_on, judged_run, held_out is not None, said, notes, options.seed)
     if held_out is not None:  # thresholds know all nominal telemetry that was given
         simulator.nominal = _joined(learnt, held_out)
         if run is not None:

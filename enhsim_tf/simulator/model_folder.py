@@ -4,26 +4,26 @@ A simulator is `arrays.npz`, `settings.json`, and `manifest.json` with the forma
 numbers is an array. No code is saved; see `packing`.
 """
 
+import hashlib
+import io
+import json
 import os
 import re
 import urllib.parse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
-from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json, short_reason
+from enhsim_tf.common.errors import InputError
 
 MANIFEST, _SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
-_MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
-_MOST_ARRAYS = 2**28  # maximum bytes of all arrays; the weights of the paper's network are 55 MB
 _MOST_NAME = 60  # bytes of the name of a folder
 _MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and locks add 50, and most file systems allow 255
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names of Windows
-_NUMBER = "5"  # of the format
+_NUMBER = "6"  # of the format
 _FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
 
 
@@ -66,24 +66,17 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
     models = Path(os.path.abspath(models))  # so that "." has a name too
     if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
-    folders = [manifest.parent for manifest in sorted(models.glob(f"[!.]*/{MANIFEST}"))] if os.path.isdir(models) else []
-    found = {urllib.parse.unquote(folder.name): folder for folder in folders}
-    if len(found) < len(folders):
-        raise InputError(
-            f"Expected one folder for each simulator. Received: two of one name in {printable(str(models))[:200]}. Rename one."
-        )
-    if not found:
-        raise InputError(
-            f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which contains none. Make one with `fit`."
-        )
-    return found
+    manifests = sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else []
+    if not manifests:
+        raise InputError(f"Expected a folder of fitted simulators. Received: {models}, which contains none. Make one with `fit`.")
+    return {urllib.parse.unquote(manifest.parent.name): manifest.parent for manifest in manifests}
 
 
 def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dict[str, Path]:
     """Selects models of `models_of` by name; None or an empty sequence selects all. Raises InputError for a name that there is not."""
     unknown = [name for name in channels or () if name not in models]
     if unknown:
-        raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
+        raise InputError(f"Expected --channel, one of: {', '.join(list(models)[:8])}. Received: {unknown[0]!r}.")
     return {name: models[name] for name in channels or models}
 
 
@@ -103,69 +96,47 @@ def refuse_foreign(folder: str | os.PathLike) -> None:
 def write_saved(folder: str | os.PathLike, arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any]) -> None:
     """Writes a simulator to a folder atomically, in place of one that was there: its arrays by name, and settings in plain JSON types.
 
-    Raises InputError if the folder contains something else, or if a number is not finite.
+    Raises InputError if the folder contains something else.
     """
     refuse_foreign(folder)
-    bad = sorted({name.partition("/")[0] for name, each in arrays.items() if not np.isfinite(each).all()})
     with replace_folder(folder) as temporary:
-        try:
-            write_json(temporary / _SETTINGS, settings)
-        except ValueError:  # JSON has no NaN and no infinity
-            bad.append("settings")
-        if bad:
-            raise InputError(
-                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. It was not saved. Fit it again."
-            )
         np.savez(temporary / _ARRAYS, **arrays)
+        write_json(temporary / _SETTINGS, settings)
         checksums = {name: sha256(temporary / name) for name in (_ARRAYS, _SETTINGS)}
         write_json(temporary / MANIFEST, {"format": _FAMILY + _NUMBER, "sha256": checksums})
 
 
-def check_saved(folder: str | os.PathLike) -> None:
-    """Raises InputError if a folder was not written by `write_saved`, or if a file in it has changed since."""
+def read_saved(folder: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Returns the arrays and the settings of a saved simulator.
+
+    Raises InputError if the folder was not written by `write_saved`, or if a file in it has changed since.
+    """
     folder = Path(folder)
-    manifest = settings_of(folder, MANIFEST)
-    found = str(manifest.get("format"))
-    if found != _FAMILY + _NUMBER:
-        number = found.removeprefix(_FAMILY)[:80]
+    form, checksums = _values_of(folder / MANIFEST, "format", "sha256")
+    if form != _FAMILY + _NUMBER:
+        number = str(form).removeprefix(_FAMILY)[:80]
         raise InputError(f"Expected a model of format {_NUMBER}. Received: format {number} in {folder}. Fit it again.")
-    if manifest.get("sha256") != {name: sha256(folder / name) if (folder / name).is_file() else "" for name in (_ARRAYS, _SETTINGS)}:
+    files = {name: (folder / name).read_bytes() for name in (_ARRAYS, _SETTINGS) if (folder / name).is_file()}
+    if checksums != {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}:
         raise InputError(
             f"Expected {_ARRAYS} and {_SETTINGS} to be unchanged since they were saved. Received: a missing or damaged file in {folder}. "
             "Fit it again."
         )
-
-
-def settings_of(folder: str | os.PathLike, name: str = _SETTINGS) -> dict[str, Any]:
-    """Reads the settings of a saved simulator, or another JSON file beside them; raises InputError if it cannot be read."""
-    try:
-        content = read_json(Path(folder) / name, _MOST_SETTINGS)
-        if not isinstance(content, dict):
-            raise ValueError("not a JSON object")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__} in {name})."
-        ) from None
-    return content
+    with np.load(io.BytesIO(files[_ARRAYS]), allow_pickle=False) as arrays:  # unpickling could run code
+        return dict(arrays), json.loads(files[_SETTINGS])
 
 
 def channels_of(folder: str | os.PathLike) -> tuple[str, ...]:
-    """Returns the names of the channels of a saved simulator without loading it; raises InputError if it is none."""
-    names = settings_of(folder).get("channels")
-    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-        raise InputError(f"Expected the names of channels in settings.json. Received: {str(names)[:80]} in {folder}. Fit it again.")
-    return tuple(names)
+    """Returns the names of the channels of a saved simulator without loading it; raises InputError if they cannot be read."""
+    return tuple(*_values_of(Path(folder) / _SETTINGS, "channels"))
 
 
-def read_saved(folder: str | os.PathLike, make: Callable[[dict[str, np.ndarray], Mapping[str, Any]], Any]) -> Any:
-    """Loads a saved simulator, which `make` creates from its arrays and settings; raises InputError as `check_saved`."""
-    folder = Path(folder)
-    check_saved(folder)
-    settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
+def _values_of(path: Path, *names: str) -> list[Any]:
+    """Returns values of a JSON file of a saved simulator by their names; raises InputError if it has not all of them."""
     try:
-        arrays = load_npz(folder / _ARRAYS, _MOST_ARRAYS)
-        if sha256(folder / MANIFEST) != as_checked:  # another process replaced the model, so the settings may be those of the other
-            raise ValueError("the simulator was replaced while it was read; try again")
-        return make(arrays, settings)
-    except READ_ERRORS as error:
-        raise InputError(f"Expected the arrays and settings of a model. Received: {folder} ({short_reason(error)}).") from None
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return [content[name] for name in names]
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise InputError(
+            f"Expected a folder written by EnhancedSimulator.save. Received: {path.parent} ({type(error).__name__} in {path.name}). Fit it again."
+        ) from None

@@ -8,26 +8,34 @@ from typing import NamedTuple
 
 import numpy as np
 
+from enhsim_tf.common.errors import spoken
 from enhsim_tf.enhancer.model import run_starts
-from enhsim_tf.simulator.joint import cut
+from enhsim_tf.simulator.joint import cut, spread_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 LEAST_WINDOWS = 8  # least length of a departure, in windows
 LEAST_FLAGGED = 0.9  # share of its samples that are flagged
-_CLEAR = 3.0  # change of a property, in widths of its nominal middle half, from which it is named
-_NUM_WINDOWS = 400  # windows of which properties are measured
+_MIXED = 2  # windows after its first sample in which a score may still see samples from before it
+_CALM = 0.25  # share of the windows between that and `LEAST_WINDOWS` up to which scores against the new operating point may be alarms
+_CLEAR = 0.1  # change from which a property is named, plus two widths of the middle half of its nominal values; see `properties`
+_NUM_WINDOWS = 400  # nominal windows whose properties count as learnt
+_NUM_PIECES, _LONGEST_PIECE = 12, 2**14  # pieces in which properties are measured, and their samples
+_VALUES = 500_000  # of windows that are measured at a time
+_PADDING = 4  # of a spectrum, which finds a period to a quarter of its width
 
 
 class Departure(NamedTuple):
     """A lasting departure from what was learnt: its first sample, and what differs, as `changed_properties` names it.
 
-    From there on, `scores` are those of the telemetry moved back to the nominal level and amplitude.
+    From there on, `scores` are those of the telemetry moved back to the nominal level and amplitude. From the sample `settled` on, those above 1
+    are alarms against the new operating point; None if too many are at once, because more has changed than level and amplitude.
     """
 
     begin: int
     what: tuple[str, ...]
     scores: np.ndarray
+    settled: int | None
 
 
 def find_departure(
@@ -44,91 +52,112 @@ def find_departure(
     window, has_left = simulator.window, scores > 1
     learnt = [] if simulator.nominal is None else simulator.judged_series(simulator.nominal, simulator.nominal_run)
     if learnt:
-        nominal = _windows_of(learnt, window)
-        limits = _limits_of(nominal)
+        unit = spread_of(np.concatenate(learnt)[None])
+        learnt, judged = [each / unit for each in learnt], [(place, series / unit) for place, series in judged]
+        # windows of two periods or more, because a shorter one has another level and shape at each phase
+        least = 0.0 if simulator.is_run_model else 2 * simulator.alignment.longest_period
+        length = min(window * max(1, int(np.ceil(least / window))), max(map(len, learnt)))
+        found = _in_rows(measured(learnt, length, evenly_spaced_starts(learnt, length, _NUM_WINDOWS)))
+        low, high = found.min(axis=0), found.max(axis=0)
+        span = np.maximum(high - low, _CLEAR)
         for place, series in judged:
-            has_left[place : place + len(series)] |= beyond(series, limits, window)
+            has_left[place : place + len(series)] |= beyond(series, low - span, high + span, length)
     begin = lasting(has_left, np.isfinite(scores), window)
     if begin is None:
         return None
-    late = []  # of each stretch the samples of the departure, and the place of the first of them
-    for place, series in judged:
-        skip = max(0, begin - place)
-        if len(series) - skip >= window:
-            late.append((place + skip, series[skip:]))
     what, after = ("shape",), scores.copy()
+    # without the first window, which may hold samples from before
+    late = [series[max(0, begin + window - place) :] for place, series in judged if place + len(series) >= begin + 2 * window]
     if learnt and late:
-        windows = _windows_of([series for _, series in late], window)
-        what = changed_properties(nominal, windows)
+        length = min(max(map(len, late)), max(map(len, learnt)) // 2, _LONGEST_PIECE)
+        old, new = (measured(series, length, evenly_spaced_starts(series, length, _NUM_PIECES)) for series in (learnt, late))
+        what = changed_properties(old, new, simulator.channels)
         (old_level, old_size), (new_level, new_size) = (
-            (np.median(each.mean(axis=1), axis=0), np.median(each.std(axis=1), axis=0)) for each in (nominal, windows)
+            [np.median(each[name], axis=0) for name in ("level", "amplitude")] for each in (old, new)
         )
-        ratio = np.where(new_size > 0, old_size / np.where(new_size > 0, new_size, 1.0), 1.0)
-        for place, series in late:
-            after[place : place + len(series)] = score_series(old_level + (series - new_level) * ratio)
-    return Departure(begin, what, after)
+        for place, series in judged:
+            moved = old_level + (series[max(0, begin - place) :] - new_level) * np.exp(old_size - new_size)
+            if len(moved) >= window:
+                after[place + len(series) - len(moved) : place + len(series)] = score_series(moved * unit)
+    settled = begin + _MIXED * window
+    first = after[settled : begin + LEAST_WINDOWS * window]
+    return Departure(begin, what, after, settled if np.mean(first > 1) <= _CALM else None)
 
 
 def lasting(has_left: np.ndarray, is_scored: np.ndarray, window: int) -> int | None:
-    """Returns the first sample from which on at least `LEAST_FLAGGED` of the scored samples have left, over `LEAST_WINDOWS` windows; or None."""
-    places = np.flatnonzero(is_scored)
+    """Returns the first sample from which on at least `LEAST_FLAGGED` of the scored samples have left, or None.
+
+    So must as many of the next `LEAST_WINDOWS` windows, so that an alarm long before a departure is none of it.
+    """
+    places, least = np.flatnonzero(is_scored), LEAST_WINDOWS * window
     flags = has_left[places]
-    following = np.cumsum(flags[::-1])[::-1] / np.arange(len(flags), 0, -1)
-    possible = np.flatnonzero(flags & (following >= LEAST_FLAGGED))
-    possible = possible[possible <= len(flags) - LEAST_WINDOWS * window]
+    starts = np.flatnonzero(flags[: max(0, len(flags) - least + 1)])
+    before = np.append(0, np.cumsum(flags))
+    soon, ever = (before[ends] - before[starts] >= LEAST_FLAGGED * (ends - starts) for ends in (starts + least, len(flags)))
+    possible = starts[soon & ever]
     return int(places[possible[0]]) if len(possible) else None
 
 
-def beyond(series: np.ndarray, limits: tuple[np.ndarray, np.ndarray], window: int) -> np.ndarray:
-    """Marks the samples of windows whose level or amplitude leaves the lowest and highest ones, each of shape `(2, channels)`."""
-    starts = run_starts(len(series), window, max(1, window // 2))
-    found = _level_and_amplitude(cut([series], starts, window))
-    marks = np.zeros(len(series), bool)
-    for start in starts[((found < limits[0]) | (found > limits[1])).any(axis=(1, 2))]:
-        marks[start : start + window] = True
-    return marks
+def beyond(series: np.ndarray, low: np.ndarray, high: np.ndarray, length: int) -> np.ndarray:
+    """Marks the samples whose nearest window leaves the lowest or highest values of its properties; none if the series is shorter."""
+    if len(series) < length:
+        return np.zeros(len(series), bool)
+    starts = run_starts(len(series), length, max(1, length // 2))
+    found = _in_rows(measured([series], length, starts))
+    outside = ((found < low) | (found > high)).any(axis=1)
+    return outside[np.searchsorted((starts[1:] + starts[:-1] + length) / 2, np.arange(len(series)))]
 
 
-def _limits_of(nominal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest level and amplitude that count as learnt: those of nominal windows, and their span beyond."""
-    found = _level_and_amplitude(nominal)
-    low, high = found.min(axis=0), found.max(axis=0)
-    span = np.maximum(high - low, 0.1 * np.median(found[:, 1], axis=0))
-    return low - span, high + span
+def _in_rows(found: dict[str, np.ndarray]) -> np.ndarray:
+    return np.concatenate([values.reshape(len(values), -1) for values in found.values()], axis=1)
 
 
-def _level_and_amplitude(windows: np.ndarray) -> np.ndarray:
-    return np.stack([windows.mean(axis=1, dtype=np.float64), windows.std(axis=1, dtype=np.float64)], axis=1)
-
-
-def changed_properties(nominal: np.ndarray, after: np.ndarray) -> tuple[str, ...]:
-    """Names what differs between nominal windows and those of a departure, both of shape `(windows, samples, channels)`, the clearest first."""
-    old, new, found = properties(nominal), properties(after), []
-    for name, values in old.items():
-        low, middle, high = np.quantile(values, (0.25, 0.5, 0.75), axis=0)
-        tiny = 1e-9 + 1e-3 * np.abs(middle) + (0.05 if name in ("channel relation", "period") else 0.0)
-        apart = np.abs(np.median(new[name], axis=0) - middle) / (high - low + tiny)
-        if apart.size and apart.max() >= _CLEAR:
-            found.append((float(apart.max()), name))
-    return tuple(name for _, name in sorted(found, reverse=True)) or ("shape",)
+def measured(series: Sequence[np.ndarray], length: int, starts: np.ndarray) -> dict[str, np.ndarray]:
+    """Measures `properties` of windows of series, some at a time; starts as in `telemetry.windows`."""
+    step = max(1, _VALUES // (length * series[0].shape[1]))
+    found = [properties(cut(series, starts[first : first + step], length)) for first in range(0, len(starts), step)]
+    return {name: np.concatenate([each[name] for each in found]) for name in found[0]}
 
 
 def properties(windows: np.ndarray) -> dict[str, np.ndarray]:
-    """Mean, standard deviation, logarithm of the mean frequency, and correlations of pairs of channels of windows, shape `(windows, values)`."""
+    """Measures windows of shape `(windows, samples, channels)`, in units of their nominal standard deviation.
+
+    Returns, for each channel, its mean, the logarithms of standard deviation and frequency, and as its shape the share of the power that lies
+    below its harmonics; and for each two channels real and imaginary part of their correlation, which a delay turns.
+    """
     values = np.asarray(windows, np.float64)
-    centred = values - values.mean(axis=1, keepdims=True)
-    power = np.abs(np.fft.rfft(centred, axis=1)) ** 2
-    frequency = np.sum(power * np.arange(power.shape[1])[:, None], axis=1) / np.maximum(power.sum(axis=1), 1e-300)
-    covariance = np.einsum("wsa,wsb->wab", centred, centred)
-    size = np.sqrt(np.maximum(np.einsum("waa->wa", covariance), 1e-300))
-    relation = (covariance / (size[:, :, None] * size[:, None]))[:, *np.triu_indices(values.shape[2], 1)]
+    length, level = values.shape[1], values.mean(axis=1)
+    spectrum = np.fft.rfft(np.hanning(length)[:, None] * (values - level[:, None]), _PADDING * length, axis=1)
+    power = np.abs(spectrum) ** 2 + 1e-300
+    frequency = _PADDING + np.argmax(power[:, _PADDING:], axis=1)  # at least one period
+    below = np.arange(power.shape[1])[:, None] < 1.5 * frequency[:, None]
+    unit = spectrum / np.sqrt(power.sum(axis=1, keepdims=True))
+    relation = unit.transpose(0, 2, 1) @ unit.conj()
     return {
-        "level": values.mean(axis=1),
-        "amplitude": values.std(axis=1),
-        "period": np.log(np.maximum(frequency, 0.5)),
-        "channel relation": relation,
+        "level": level,
+        "amplitude": np.log(values.std(axis=1) + 1e-6 * (1 + np.abs(level))),  # above the rounding of float32
+        "period": np.log(frequency),
+        "shape": (power * below).sum(axis=1) / power.sum(axis=1),
+        "channel relation": np.stack([relation.real, relation.imag], axis=1),
     }
 
 
-def _windows_of(series: Sequence[np.ndarray], window: int) -> np.ndarray:
-    return cut(series, evenly_spaced_starts(series, window, _NUM_WINDOWS), window)
+def changed_properties(old: dict[str, np.ndarray], new: dict[str, np.ndarray], channels: Sequence[str]) -> tuple[str, ...]:
+    """Names what differs between two of `measured`, and of several channels in which, for example `level of volts`.
+
+    A shape is not named beside another amplitude or period of its channel, with which it changes, and for the same reason no relation beside these.
+    """
+    clear = {}
+    for name, values in old.items():
+        low, middle, high = np.quantile(values, (0.25, 0.5, 0.75), axis=0)
+        clear[name] = np.abs(np.median(new[name], axis=0) - middle) > _CLEAR + 2 * (high - low)
+    clear["shape"] &= ~(clear["amplitude"] | clear["period"])
+    other = clear["amplitude"] | clear["period"] | clear["shape"]
+    number = (clear["channel relation"].any(axis=0) & ~(other[:, None] | other)).sum(axis=0)
+    clear["channel relation"] = (number > 0) & (number == number.max())  # the channel whose relation to most others has changed
+    found = []
+    for name, marks in clear.items():
+        names = [channel for channel, is_clear in zip(channels, marks, strict=True) if is_clear]
+        if names:
+            found.append(name if len(channels) == 1 else f"{name} of {' and '.join(names) if len(names) <= 3 else spoken(names)}")
+    return tuple(found) or ("shape",)

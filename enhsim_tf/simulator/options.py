@@ -7,7 +7,7 @@ from typing import Any
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
 from enhsim_tf.enhancer.names import BEST, CANDIDATES
-from enhsim_tf.noise.names import CANDIDATES as NOISES
+from enhsim_tf.noise.names import NOISES
 
 FEWEST_SAMPLES = 32  # minimum window length on request
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
@@ -51,7 +51,7 @@ class FitOptions:
         window: Length of a window in samples.
         num_windows: Number of training windows.
         epochs: Passes of a network over the training windows.
-        noise: Name of the noise model, or `best`.
+        noise: Name of the noise model. None: matched residual windows for square waves, residual windows for a recorded run.
         enhancer: Name of the enhancer, or `best`.
         held_out: Share of the telemetry, taken from its end, on which the report is measured. 0 fits and reports on all of it.
         delay_s: Delay of the telemetry relative to a recorded run, in seconds.
@@ -69,10 +69,10 @@ class FitOptions:
     )
     num_windows: int = _option(1_000, "number of training windows (default: 1000; fewer for many channels)", least=1)
     epochs: int = _option(6, "training epochs of a network (default: 6)", least=1)
-    noise: str = _option(
-        BEST,
-        "noise model (default: best, the simplest that held-out telemetry does not tell from real noise)",
-        choices=(BEST, *NOISES),
+    noise: str | None = _option(
+        None,
+        "noise model (default: matched-residual-windows; with --coarse, whose signal seldom repeats, residual-windows)",
+        choices=NOISES,
     )
     enhancer: str = _option(
         BEST,
@@ -126,7 +126,7 @@ def add_options(parser: argparse.ArgumentParser, options: type, *names: str) -> 
     for name in names:
         default, about = fields[name].default, fields[name].metadata
         if about["choices"]:
-            given = {"choices": tuple(map(option_name, about["choices"])), "default": option_name(default)}
+            given = {"choices": tuple(map(option_name, about["choices"])), "default": default and option_name(default)}
         else:
             metavar = {"held_out": "SHARE", "false_alarm_rate": "SHARE", "delay_s": "SECONDS"}.get(name, "N")
             given = {"type": about["kind"], "default": default, "metavar": metavar}

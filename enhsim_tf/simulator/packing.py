@@ -1,5 +1,6 @@
 """What is saved of a simulator: each part is its kind and its arguments, in JSON, and each array has a name in `arrays.npz`."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,7 @@ from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.alignment import Runs, Waves
 from enhsim_tf.telemetry.quantisation import Levels
 
@@ -24,10 +24,7 @@ _ARGUMENTS = {
     Recording: ("parts", "columns", "interval_s", "start", "name"),
     Run: ("values", "offset_s"),
     Enhancer: ("name", "window", "columns", "channels", "centre", "bias", "factors", "layers", "main"),
-    GaussianNoise: ("root", "window", "processes"),
-    GaussianAutoregression: ("coefficients", "innovation_sd"),
-    WindowBootstrap: ("windows", "starts"),
-    MatchedWindowBootstrap: ("windows", "signals", "starts"),
+    WindowBootstrap: ("windows", "signals"),
     Levels: ("step", "origin", "count"),
 }
 """The kinds that are saved, and made again on loading, with the arguments that are saved; each has an attribute of the same name."""
@@ -56,17 +53,10 @@ def packed(value: Any, arrays: dict[str, np.ndarray], name: str) -> Any:
     )
 
 
-def unpacked(state: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """Makes a part again from what `packed` returned, and takes its arrays out of `arrays`.
-
-    Raises ValueError, LookupError, TypeError or another of `READ_ERRORS` if it is none of the known kinds, or a number is not finite.
-    """
+def unpacked(state: Any, arrays: Mapping[str, np.ndarray]) -> Any:
+    """Makes a part again from what `packed` returned and the arrays that it named. No other kinds are made."""
     if isinstance(state, list):
         return tuple(unpacked(each, arrays) for each in state)
     if isinstance(state, dict) and "kind" in state:
         return _KINDS[state["kind"]](**{name: unpacked(each, arrays) for name, each in state.items() if name != "kind"})
-    if isinstance(state, dict):
-        state = arrays.pop(state["array"])  # each is used once, so a small file cannot become a large simulator
-    if isinstance(state, float | np.ndarray) and not np.isfinite(state).all():
-        raise ValueError("a number that is not finite")
-    return state
+    return arrays[state["array"]] if isinstance(state, dict) else state

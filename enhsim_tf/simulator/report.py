@@ -12,7 +12,6 @@ from enhsim_tf.enhancer.candidates import Choice, fit_enhancer
 from enhsim_tf.enhancer.names import COARSE
 from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
 from enhsim_tf.simulator.joint import nrmse, windows_of
-from enhsim_tf.simulator.noise_choice import TOLD_APART
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
@@ -35,7 +34,6 @@ class Report:
     enhancers: list[dict[str, Any]]  # `name`, `error` (NRMSE), `standard_error` and `is_chosen` of each that was judged
     nrmse: dict[str, dict[str, float]]  # of each channel, the error of `coarse` and `enhanced` in standard deviations of the telemetry
     noise_model: str
-    noise_candidates: list[dict[str, Any]]  # of `noise_choice.choose_noise`; empty if the model was asked for or could not be judged
     cross_correlation: dict[str, Any]  # of several channels, see `_cross_correlation`
     detectors: list[dict[str, Any]]  # see `detector_choice.JudgedDetector`
     detector: str  # the one that `score` uses
@@ -58,7 +56,7 @@ class Report:
             *self.notes,
             self._of_enhancers(),
             self._of_signals(),
-            self._of_noise(),
+            f"noise: {self.noise_model}",
             self._of_cross_correlation(),
             self._of_detectors(),
         ]
@@ -81,11 +79,6 @@ class Report:
                 f"WARNING: {self.detector}, the detector that score uses, finds only {recall:.0%} of the injected anomalies, so a fault can go unseen. "
                 "Compare the line of the detectors; another --window, or --detector of score, may find more"
             )
-        used = next((each for each in self.noise_candidates if each["is_chosen"]), None)
-        if used is not None and (used["auc"] or 0) > TOLD_APART:
-            found.append(
-                f"WARNING: a classifier tells generated noise from real (AUC {used['auc']:.2f}; real from real {used['real_auc']:.2f})"
-            )
         return found
 
     def _of_enhancers(self) -> str:
@@ -99,21 +92,6 @@ class Report:
             return f"signals: error of the enhanced (and of the coarse) signal, NRMSE, with the noise: {said}"
         (errors,) = self.nrmse.values()
         return f"signal: error {errors['enhanced']:.3f} of the enhanced signal, {errors['coarse']:.3f} of the coarse one (NRMSE, with the noise)"
-
-    def _of_noise(self) -> str:
-        if not self.noise_candidates:
-            return f"noise: {self.noise_model}"
-        judged = []
-        for each in self.noise_candidates:
-            auc = "-" if each["auc"] is None else f"{each['auc']:.2f}"
-            judged.append(f"{each['name']} {auc}, {each['alarms']:.1%} and {each['recall']:.0%}")
-        used = next(each for each in self.noise_candidates if each["is_chosen"])
-        real = f"real {used['real_auc']:.2f}, {used['real_alarms']:.1%} and {used['real_recall']:.0%}"
-        why = "the simplest that passes" if used["passes"] else "none passes, and it departs least"
-        return (
-            f"noise on held-out time (AUC of a classifier against real noise; false alarms and recall of two detectors): {'; '.join(judged)}; {real}. "
-            f"Used: {self.noise_model}, {why if used['name'] == self.noise_model else 'because held-out time contradicts the other'}"
-        )
 
     def _of_detectors(self) -> str:
         rates = []
@@ -136,7 +114,6 @@ class Report:
 def make_report(
     simulator: EnhancedSimulator,
     choice: Choice,
-    noise_rows: list[dict[str, Any]],
     detectors: Sequence[JudgedDetector],
     judged: Recording,
     run: Recording | None,
@@ -166,7 +143,6 @@ def make_report(
         ],
         nrmse={name: {kind: float(each[k]) for kind, each in errors.items()} for k, name in enumerate(simulator.channels)},
         noise_model=trained["noise"],
-        noise_candidates=noise_rows,
         cross_correlation=_cross_correlation(simulator.channels, noise, generated),
         detectors=[dataclasses.asdict(each) | {"keeps": bool(each.keeps)} for each in detectors],
         detector=trained["detector"],

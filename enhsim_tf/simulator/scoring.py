@@ -1,7 +1,7 @@
 """Scores telemetry with a detector that has learnt from generated nominal telemetry.
 
-The threshold is the larger of two: that of generated telemetry, and that of the nominal telemetry of the fit. Generated telemetry may raise a
-threshold, and never undercuts what real nominal time shows.
+The threshold is the largest of three: that of generated telemetry, that of the nominal telemetry of the fit, and that of its end alone, which was
+held out, since the residual is smaller where the enhancer has learnt. Generated telemetry never undercuts what real nominal time shows.
 """
 
 import dataclasses
@@ -17,13 +17,13 @@ from threadpoolctl import threadpool_limits
 
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_square
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL
 from enhsim_tf.enhancer.model import run_starts
-from enhsim_tf.simulator.joint import cut, telemetry_of
+from enhsim_tf.simulator.joint import cut, split_end, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
@@ -36,6 +36,8 @@ _STRIDES = 8  # number of scored windows that begin within one window length
 _SERIES_VALUES = 4_000_000  # most values of such a series
 _CHUNK_VALUES = 4_000_000  # values of windows that are scored at a time
 _NOMINAL_VALUES = 2_000_000  # most values of nominal telemetry with which a threshold is set
+LEARNT, NEW = "learnt", "new operating point"
+"""What an event departs from."""
 DEFAULT = "PCA residual"
 """The detector of a simulator whose fit chose none."""
 
@@ -76,9 +78,10 @@ class Scorer:
         else:
             self.detector.fit(self._judged(training))
         generated, self.rate = metrics.finite_threshold(self._of_generated(seed + 1), self.options.false_alarm_rate, self._length)
-        real, self.nominal_threshold = self._of_nominal(), -np.inf
-        if len(real):
-            self.nominal_threshold = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0]
+        self.nominal_threshold = -np.inf
+        for real in self._of_nominal():
+            found, _ = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)
+            self.nominal_threshold = max(self.nominal_threshold, found)
         self.threshold = max(generated, self.nominal_threshold)
 
     @functools.cached_property
@@ -92,22 +95,25 @@ class Scorer:
             series = series - self.simulator.nominal_series(len(series))
         return self._raw(series)
 
-    def _of_nominal(self) -> np.ndarray:
-        """Scores the nominal telemetry of the fit: of parts with too many values the middle."""
+    def _of_nominal(self) -> list[np.ndarray]:
+        """Scores the nominal telemetry of the fit, and its held-out end once more, as a series of its own."""
         nominal, run = self.simulator.nominal, self.simulator.nominal_run
         if nominal is None:
-            return np.zeros(0)
-        kept = sum(len(part) >= self.window for part in nominal.parts)
-        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, kept)))
+            return []
+        held_out = 1 - self.simulator.trained.get("num_samples", len(nominal)) / len(nominal)
+        found = [self._of_recording(nominal, run)]
+        if held_out:
+            found.append(self._of_recording(*(split_end(each, held_out)[1] for each in (nominal, run))))
+        return [scores for scores in found if len(scores)]
 
-        def middle(recording: Recording) -> Recording:
-            parts = []
-            for part in recording.parts:
-                first = max(0, (len(part) - most) // 2)
-                parts.append(Run(part.values[first : first + most]))
-            return dataclasses.replace(recording, parts=tuple(parts))
+    def _of_recording(self, nominal: Recording, run: Recording | None) -> np.ndarray:
+        """Scores nominal telemetry: of parts with too many values the end."""
+        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * len(nominal.parts)))
 
-        series = self.simulator.judged_series(middle(nominal), None if run is None else middle(run))
+        def end(recording: Recording) -> Recording:
+            return dataclasses.replace(recording, parts=tuple(Run(part.values[-most:]) for part in recording.parts))
+
+        series = self.simulator.judged_series(end(nominal), None if run is None else end(run))
         return np.concatenate([np.zeros(0), *map(self._raw, series)])
 
     def _judged(self, windows: np.ndarray) -> np.ndarray:
@@ -195,7 +201,7 @@ def score(
         judged.append((place, seen))
     if not judged:
         raise InputError(
-            f"Expected a part of at least one window of {simulator.window} samples. Received: {max(map(len, telemetry.parts))} samples. "
+            f"Expected a part of at least one window of {simulator.window} samples. Received: {counted(max(map(len, telemetry.parts)), 'sample')}. "
             "Give more telemetry."
         )
     single = len(simulator.channels) == 1
@@ -211,7 +217,7 @@ def score(
         "detector": scorer.name,
         "expected_false_alarm_rate": scorer.rate,
         "false_alarms_per_day": list(false_alarms_per_day(num_alarms, len(nominal) * simulator.interval_s)),
-        "events": event_rows(scores, edges, nominal, scorer.window, simulator.interval_s, departure and departure.begin),
+        "events": event_rows(scores, edges, nominal, scorer.window, simulator.interval_s, departure),
         "counts": telemetry.clock().counts,
         "departure": "",
     }
@@ -259,38 +265,51 @@ def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
 def _departure_text(frame: pd.DataFrame, departure: Departure) -> str:
     when = told_times(frame, frame.index[[departure.begin]])[0]
     when = f"{when:.10g} s" if isinstance(when, float) else when
+    moved = "." if departure.settled is not None else ", which a moved level and amplitude do not reach, so they are no events."
     return (
-        f"since {when} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a lasting fault, or "
-        "the new normal: then go on with `update`. score_after are scores against the new operating point."
+        f"1 lasting departure since {when}: the telemetry has left what was learnt and stays there ({', '.join(departure.what)}). It is a lasting "
+        f"fault, or the new normal: then go on with `update`. score_after are scores against the new operating point{moved}"
     )
 
 
 def event_rows(
-    scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: int | None = None
+    scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: Departure | None = None
 ) -> list[dict]:
     """Returns the events in plain JSON types; flags of a part within a window of each other are one event, as they share windows.
 
-    `edges` are the first samples of the parts and the number of samples; from the first sample of a departure on, all is one event.
+    `edges` are the first samples of the parts and the number of samples. From the first sample of a departure on, all is one event against what
+    was learnt, and alarms of its own scores are events against the new operating point.
     """
-    found, before = [], len(scores) if departure is None else departure
-    for first, end in itertools.pairwise(edges):
-        own = np.where(np.arange(first, end) < before, scores[first:end], np.nan)
-        found += [Event(*(int(first) + place for place in event)) for event in events_of(own > 1, own, window)]
+    end = len(scores) if departure is None else departure.begin
+    found = [(LEARNT, scores, event) for event in _events(scores, 0, end, edges, window)]
     if departure is not None:
-        found.append(Event(departure, len(scores), departure + int(np.nanargmax(scores[departure:]))))
-    peaks = [float(scores[event.peak]) for event in found]
+        found.append((LEARNT, scores, Event(end, len(scores), end + int(np.nanargmax(scores[end:])))))
+        if departure.settled is not None:
+            later = _events(departure.scores, departure.settled, len(scores), edges, window)
+            found += [(NEW, departure.scores, event) for event in later]
+    peaks = [float(own[event.peak]) for _, own, event in found]
     return [
         {
             "begin": event.begin,
             "end": event.end,
             "peak": event.peak,
             "duration_s": (event.end - event.begin) * interval_s,
-            "num_flagged": int((scores[event.begin : event.end] > 1).sum()),
+            "num_flagged": int((own[event.begin : event.end] > 1).sum()),
             "score": peak,
             "confidence": float(confidence),
+            "against": against,
         }
-        for event, peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True)
+        for (against, own, event), peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True)
     ]
+
+
+def _events(scores: np.ndarray, begin: int, end: int, edges: Sequence[int], window: int) -> list[Event]:
+    """The events of each part among the samples from `begin` to `end`."""
+    found = []
+    for first, last in itertools.pairwise(np.clip(edges, begin, end).tolist()):
+        own = scores[first:last]
+        found += [Event(*(first + place for place in event)) for event in events_of(own > 1, own, window)]
+    return found
 
 
 def told_times(frame: pd.DataFrame, index: pd.Index | None = None) -> pd.Index:
@@ -306,16 +325,14 @@ def events_table(frame: pd.DataFrame) -> pd.DataFrame:
 
     Runs of flags that are at most one window apart are one event; so is a lasting departure. The columns are `begin`, `end` and `peak` (times of
     the first flagged sample, of the sample after the last one, and of the highest score; sample numbers if the telemetry has no times),
-    `duration_s`, `num_flagged`, `score` (the highest score; the threshold is 1) and `confidence` (see `events.confidences`).
+    `duration_s`, `num_flagged`, `score` (the highest score; the threshold is 1), `confidence` (see `events.confidences`), and `against`: what was
+    `LEARNT`, or within a lasting departure the `NEW` operating point, with `num_flagged` and `score` of `score_after`.
     """
-    names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence"]
+    names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence", "against"]
     table = pd.DataFrame(frame.attrs["events"], columns=names)
-    index, begin, end = frame.index, table["begin"].to_numpy(int), table["end"].to_numpy(int)
-    if hasattr(index, "tz"):
-        after = index[begin] + pd.to_timedelta(table["duration_s"].to_numpy(float), unit="s").round("us")
-    else:
-        after = index[end - 1] + 1
-    places = {"begin": index[begin], "end": after, "peak": index[table["peak"].to_numpy(int)]}
+    index, (begin, end, peak) = frame.index, table[["begin", "end", "peak"]].to_numpy(int).T
+    step = pd.to_timedelta(table["duration_s"].to_numpy(float) / (end - begin), unit="s").round("us") if hasattr(index, "tz") else 1
+    places = {"begin": index[begin], "end": index[end - 1] + step, "peak": index[peak]}
     return table.assign(**{name: told_times(frame, place) for name, place in places.items()})
 
 

@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
-from enhsim_tf.coarse_simulator.recording import Recording, record
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.read_errors import READ_ERRORS, short_reason
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
-from enhsim_tf.noise.candidates import NoiseModel
+from enhsim_tf.noise.window_bootstrap import NoiseModel
 from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
 from enhsim_tf.simulator.joint import cut, rounded, windows_of
@@ -38,7 +37,7 @@ class EnhancedSimulator:
     Args:
         alignment: The coarse simulator, and how it is aligned with telemetry.
         enhancer: Maps coarse windows of all columns to windows of all channels.
-        noise: The noise model of all channels, see `noise.candidates`.
+        noise: The noise model of all channels, see `noise.window_bootstrap`.
         channels: Names of the channels.
         interval_s: Sampling interval in seconds.
         levels: For square waves: offset and gain of each channel at several times, in the order of time, shape `(times, channels, 2)`. Each
@@ -187,48 +186,57 @@ class EnhancedSimulator:
         Raises:
             InputError: If `num_windows` is negative or not a whole number, or a scenario cannot be applied.
         """
-        return self._joined(num_windows, self.generate_labelled_chunks(num_windows, scenario, seed))
+        return self._joined(num_windows, scenario, seed)
 
     def generate_clean(self, num_windows: int, seed: int = 0) -> np.ndarray:
         """Returns the nominal windows of `generate` before noise is added."""
-        return self._joined(num_windows, self.generate_labelled_chunks(num_windows, None, seed, with_noise=False))
+        return self._joined(num_windows, None, seed, with_noise=False)
 
     def generate_labelled_chunks(
-        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0, with_noise: bool = True
+        self, scenarios: Sequence[Degraded | None], seed: int = 0, with_noise: bool = True
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yields the windows of `generate` in chunks, each with a mask of the samples that the scenario has changed.
+        """Yields windows as those of `generate`, one for each scenario, in chunks, with a mask of the samples that the scenario has changed.
 
         Memory does not grow with the number of windows. A sample that is not marked equals that of the same seed without a scenario.
         """
         rng, noise_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1]) if with_noise else None
+        num_windows = len(scenarios)
         starts = rng.integers(0, START_RANGE, num_windows)
         rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
         chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
         for first in range(0, num_windows, chunk):
             some = slice(first, first + chunk)
-            drawn = self.alignment.draw(starts[some], [scenario] * len(starts[some]), rng)
-            yield self.complete(drawn, None if self.levels is None else self.levels[rows[some]], noise_rng)
+            drawn = self.alignment.draw(starts[some], scenarios[some], rng)
+            degraded = [row for row, scenario in enumerate(scenarios[some]) if scenario is not None]
+            yield self._complete(drawn, degraded, None if self.levels is None else self.levels[rows[some]], noise_rng)
 
-    def _joined(self, num_windows: int, chunks: Iterator[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    def _joined(self, num_windows: int, scenario: Degraded | None, seed: int, with_noise: bool = True) -> np.ndarray:
         _check_count("num_windows", num_windows, 0)
         windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
-        for chunk, _ in chunks:
+        for chunk, _ in self.generate_labelled_chunks([scenario] * num_windows, seed, with_noise):
             windows[filled : filled + len(chunk)] = chunk
             filled += len(chunk)
         return windows
 
-    def complete(self, drawn: Drawn, levels: np.ndarray | None, noise_rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
+    def _complete(
+        self, drawn: Drawn, degraded: list[int], levels: np.ndarray | None, noise_rng: np.random.Generator | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Completes coarse windows to telemetry; returns float32 windows, and a mask of the samples that a degraded mode has changed.
 
-        `levels` are offset and gain of each window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the
-        nominal signal, so samples that are not marked equal the nominal ones to the bit.
+        `degraded` are the numbers of the windows with a degraded mode; the others are enhanced once. `levels` are offset and gain of each
+        window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the nominal signal, so samples that are
+        not marked equal the nominal ones to the bit.
         """
-        shift, gain = (None, None) if levels is None else (levels[..., 0], levels[..., 1])
-        clean = self.enhance(drawn.nominal, shift, gain)
-        windows, mask = clean, np.zeros(clean.shape, bool)
-        if drawn.coarse is not drawn.nominal:
-            degraded = self.enhance(drawn.coarse, shift, gain)
-            windows, mask = put_changes(clean, degraded, drawn, [(0, self.window)], fade_length(self.window), self._tolerance)
+
+        def enhanced(coarse: np.ndarray, rows: slice | list[int]) -> np.ndarray:
+            return self.enhance(coarse[rows], *(() if levels is None else (levels[rows, :, 0], levels[rows, :, 1])))
+
+        clean = windows = enhanced(drawn.nominal, slice(None))
+        mask = np.zeros(clean.shape, bool)
+        if degraded:
+            windows, some = clean.copy(), Drawn(*(None if each is None else each[degraded] for each in drawn))
+            changed, fade = enhanced(drawn.coarse, degraded), fade_length(self.window)
+            windows[degraded], mask[degraded] = put_changes(clean[degraded], changed, some, [(0, self.window)], fade, self._tolerance)
         return (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
 
     @property
@@ -341,20 +349,6 @@ class EnhancedSimulator:
             rng = np.random.default_rng([seed, 1, number])
             yield [self.add_noise(enhanced, rng) for enhanced in clean]
 
-    def simulate(self, time_s: np.ndarray, scenario: Any = None, seed: int = 0, labels: Mapping[str, Any] | None = None) -> Recording:
-        """Runs the coarse simulator at times with the interval of this one, see `recording.record`; the seed is that of the scenario.
-
-        Raises:
-            InputError: If there is no simulator, because this one was loaded and code is not saved.
-        """
-        runs = self.recorded_runs()
-        if runs.coarse is None:
-            raise InputError(
-                f"Expected the coarse simulator {runs.name}, which is not saved with the model. Received: none. "
-                "Give it again, as in EnhancedSimulator.load(folder, coarse=simulator), or give a recorded run."
-            )
-        return record(runs.coarse, time_s, scenario, np.random.default_rng(seed), labels=labels)
-
     def recorded_runs(self) -> Runs:
         """Returns the alignment of a simulator of recorded runs; raises InputError if it is one of square waves."""
         if not isinstance(self.alignment, Runs):
@@ -369,72 +363,20 @@ class EnhancedSimulator:
         """Saves the simulator to a folder, see `model_folder`, in place of one that was saved there before.
 
         Raises:
-            InputError: If the folder contains something else, or if a number is not finite; the folder is left unchanged.
+            InputError: If the folder contains something else; it is left unchanged.
         """
         arrays: dict[str, np.ndarray] = {}
         settings = {name: packed(getattr(self, name), arrays, name) for name in _SAVED}
         write_saved(folder, arrays, settings | {"trained": self.trained})
 
     @classmethod
-    def load(cls, folder: str | os.PathLike, coarse: CoarseSimulator | None = None) -> "EnhancedSimulator":
-        """Loads a saved simulator.
-
-        Args:
-            folder: A folder written by `save`.
-            coarse: The coarse simulator, for a model of the user's own simulator, whose code is not saved.
-
-        Raises:
-            InputError: If the folder was not written by `save`, a file in it has changed since, or the coarse simulator has other columns.
-        """
-        simulator = read_saved(folder, cls._from_saved)
-        if coarse is not None:
-            runs = simulator.recorded_runs()
-            if set(runs.columns) - set(coarse.columns):
-                raise InputError(
-                    f"Expected a simulator with the columns {', '.join(runs.columns)[:120]}. Received: {name_of(coarse)} with "
-                    f"{', '.join(coarse.columns)[:120]}. Give the simulator of the fit."
-                )
-            runs.coarse = coarse
-        return simulator
-
-    @classmethod
-    def _from_saved(cls, arrays: dict[str, np.ndarray], settings: Mapping[str, Any]) -> "EnhancedSimulator":
-        with np.errstate(all="ignore"):  # what is not finite is refused
-            parts = {name: unpacked(settings[name], arrays) for name in _SAVED}
-            if arrays:
-                raise ValueError(f"{len(arrays)} arrays of no part")
-            simulator = cls(**parts, trained=settings["trained"])
-            simulator._check_parts()
-        return simulator
-
-    def _check_parts(self) -> None:
-        """Raises ValueError, or another of `READ_ERRORS`, unless the parts of a loaded simulator are of the right kinds and fit together."""
-        alignment, enhancer, size = self.alignment, self.enhancer, len(self.channels)
-        clock = alignment.nominal if self.is_run_model else alignment
-        recordings = [each for each in (self.nominal, self.nominal_run) if each is not None]
-        runs = [run for each in recordings for run in each.parts]
-        fits = {
-            "channels": all(isinstance(name, str) for name in self.channels),
-            "interval": clock.interval_s == self.interval_s > 0 and self.level_step > 0,
-            "alignment": alignment.window == self.window and len(alignment.columns) == enhancer.columns,
-            "commands": not self.is_run_model or isinstance(alignment.commands, CommandTraces | None),
-            "enhancer": enhancer.channels == size and enhancer.bias.shape == (self.window * size,),
-            "noise": getattr(self.noise, "window", self.window) == self.window,
-            "levels": (self.levels is None) == self.is_run_model,
-            "quantisation": len(self.quantisation) == size,
-            "nominal": self.nominal is None or (self.nominal.columns, self.nominal.interval_s) == (self.channels, self.interval_s),
-            "parts": len({tuple(map(len, each.parts)) for each in recordings}) <= 1,
-            "start": all(isinstance(each.start, str | None) for each in recordings),
-            "runs": all(run.values.dtype == np.float32 and np.isfinite(run.offset_s) for run in runs),
-        }
-        if not all(fits.values()):
-            raise ValueError(f"parts that do not fit together: {', '.join(name for name, does in fits.items() if not does)}")
-        shape = (1, self.window, size)
-        if self.noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
-            raise ValueError("noise of another shape")
-        window = self.generate(1)  # fails, as the residuals do, if a part is of another kind or an array of another shape
-        if not self.is_run_model:
-            self.residuals(window)
+    def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
+        """Loads a saved simulator; raises InputError if the folder was not written by `save`, or a file in it has changed since."""
+        arrays, settings = read_saved(folder)
+        try:
+            return cls(**{name: unpacked(settings[name], arrays) for name in _SAVED}, trained=settings["trained"])
+        except READ_ERRORS as error:
+            raise InputError(f"Expected the parts of a simulator. Received: {folder} ({short_reason(error)}). Fit it again.") from None
 
 
 def _changed_events(changed: np.ndarray, events: Sequence[tuple[Degraded, int, int]]) -> list[tuple[str, float, int, int]]:

@@ -1,5 +1,8 @@
 """Detects coarse windows outside the enhancer's training range, for which enhanced windows are extrapolations."""
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
@@ -30,7 +33,7 @@ class TrustedRange:
 
     def __init__(self, simulator: EnhancedSimulator):
         self.simulator = simulator
-        learnt, held_out = (self._drawn(None, _NUM_NOMINAL, seed) for seed in range(2))
+        learnt, held_out = (self._drawn([None], _NUM_NOMINAL, seed) for seed in range(2))
         self._centre, self._scale = learnt.mean(axis=(0, 1), dtype=np.float64), spread_of(learnt)
         self._range, self._limit = None, _LEAST_LIMIT
         if np.ptp(learnt, axis=0).any():  # whatever differs from constant levels is outside
@@ -53,10 +56,11 @@ class TrustedRange:
         scores = self.score(cut([np.asarray(coarse, np.float32)], starts, window))
         return average_windows(lambda rows: np.repeat(scores[rows, None, None], window, axis=1), starts, window, len(coarse))[:, 0]
 
-    def share_outside(self, scenario: Degraded | None) -> float:
-        """Returns the share of 200 windows of a scenario that are outside the training range; None is nominal."""
-        return float(np.mean(self.score(self._drawn(scenario, 200, seed=2)) > 1))
+    def share_outside(self, *scenarios: Degraded | None) -> float:
+        """Returns the share of 200 windows of the scenarios, used in turn, that are outside the training range; None is nominal."""
+        return float(np.mean(self.score(self._drawn(scenarios, 200, seed=2)) > 1))
 
-    def _drawn(self, scenario: Degraded | None, num_windows: int, seed: int) -> np.ndarray:
+    def _drawn(self, scenarios: Sequence[Degraded | None], num_windows: int, seed: int) -> np.ndarray:
         rng = np.random.default_rng([seed, 3])
-        return self.simulator.alignment.draw(rng.integers(0, START_RANGE, num_windows), [scenario] * num_windows, rng).coarse
+        in_turn = list(itertools.islice(itertools.cycle(scenarios), num_windows))
+        return self.simulator.alignment.draw(rng.integers(0, START_RANGE, num_windows), in_turn, rng).coarse

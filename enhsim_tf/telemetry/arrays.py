@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import MAX_COLUMNS, load_npy
+from enhsim_tf.common.read_errors import MAX_COLUMNS, READ_ERRORS, short_reason
 from enhsim_tf.telemetry.cleaning.report import Finding
 from enhsim_tf.telemetry.reading.channels import Channels
 from enhsim_tf.telemetry.reading.clock import NO_TIME
@@ -28,10 +28,12 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None)
     if time not in (None, NO_TIME):
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
     try:
-        array = load_npy(path)
-    except ValueError as error:
+        array = np.load(path, allow_pickle=False)  # unpickling could run code
+        if not isinstance(array, np.ndarray) or array.dtype.kind in "SUV":
+            raise ValueError("an archive, text or records; save records as a table")
+    except READ_ERRORS as error:
         raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({short_reason(error)}). Save it again."
         ) from None
     if array.ndim not in (1, 2):
         raise InputError(

@@ -6,27 +6,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, counted
 
 _TRIES = 100  # drawn places of an event, before the series is said to have no place where it changes a sample
 
 
 @dataclasses.dataclass(frozen=True)
 class PlacedEvent:
-    """An anomaly or a degraded mode at a place in a series, which is nominal after its last sample.
+    """An anomaly or a degraded mode at a place in a series, which is nominal after its last sample."""
 
-    Raises:
-        InputError: If it has no sample, or begins before the series.
-    """
-
-    kind: str  # of `anomalies.INJECTIONS` or `degraded.MODES`
+    kind: str  # of `anomalies.INJECTIONS`, `inject_options.JOINT_KINDS` or `degraded.MODES`
     severity: float
     begin: int  # first sample
     length: int  # number of samples
-
-    def __post_init__(self):
-        if self.begin < 0 or self.length < 1:
-            raise InputError(f"Expected an event of at least one sample, from sample 0 on. Received: {self}.")
+    channel: str | None = None  # which it changes, of several; None: all
 
     @property
     def end(self) -> int:
@@ -44,10 +37,10 @@ def in_order(events: Sequence[PlacedEvent], bounds: Sequence[tuple[int, int]], g
     """
     ordered = sorted(events, key=lambda event: event.begin)
     for event in ordered:
-        if not any(start <= event.begin and event.end <= stop for start, stop in bounds):
+        if not any(start <= event.begin < event.end <= stop for start, stop in bounds):
             raise InputError(
-                f"Expected events within a part of the series, of {len(bounds)} parts with {bounds[-1][1]:,} samples. Received: {event}. "
-                "Choose a place that no gap and no end cuts."
+                f"Expected events of a sample or more within a part of the series, of {counted(bounds[-1][1], 'sample')} in "
+                f"{counted(len(bounds), 'part')}. Received: {event}. Choose a place that no gap and no end cuts."
             )
     for before, after in itertools.pairwise(ordered):
         if after.begin < before.end + gap:
@@ -75,8 +68,8 @@ def place_events(
         event = next(filter(changes, tries), None)
         if event is None:
             raise InputError(
-                f"Expected a place where the event changes a sample. Received: {kind} at {severity:g} over {length} samples, which changes "
-                f"nothing at {_TRIES} drawn places. Leave it out, or give it a higher severity or a greater length."
+                f"Expected a place where the event changes a sample. Received: {kind} at {severity:g} over {counted(length, 'sample')}, "
+                f"which changes nothing at {_TRIES} drawn places. Leave it out, or give it a higher severity or a greater length."
             )
         placed.append(event)
     return sorted(placed, key=lambda event: event.begin)
@@ -96,7 +89,7 @@ def draw_begin(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int
     free = np.concatenate(places)
     if not len(free):
         raise InputError(
-            f"Expected room for events that do not overlap. Received: {bounds[-1][1]:,} samples, in which {len(taken)} events are placed and "
-            f"{length} samples with a gap of {gap} on each side are nowhere free. Ask for fewer or shorter ones."
+            f"Expected room for events that do not overlap. Received: {counted(bounds[-1][1], 'sample')} with "
+            f"{counted(len(taken), 'event')}, nowhere {length:,} free ones with {gap:,} more on each side. Ask for fewer or shorter ones."
         )
     return int(free[rng.integers(len(free))])

@@ -6,7 +6,6 @@ Findings made while reading are stored in `series.attrs["findings"]` and become 
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import pandas as pd
 
@@ -15,7 +14,7 @@ from enhsim_tf.telemetry.arrays import read_array_channels
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.influx_store import InfluxStore
 from enhsim_tf.telemetry.reading.channels import Channels, read_table_channels
-from enhsim_tf.telemetry.registry import SOURCES, TABLES
+from enhsim_tf.telemetry.registry import SOURCES, TABLES, existing
 
 Source = str | os.PathLike | Sequence[str | os.PathLike] | pd.DataFrame | pd.Series
 
@@ -47,30 +46,16 @@ def read_source(source: Source, columns: Sequence[str] | None = None, time: str 
         raise InputError(f"Expected columns of different names. Received: columns={columns}. Name each once.")
     if isinstance(source, pd.DataFrame | pd.Series):
         return read_table_channels(source, columns, time, options)
-    if not isinstance(source, str | os.PathLike):
-        paths = [Path(os.fspath(each)) for each in source]
-        wrong = next((path for path in paths if path.suffix.lower() not in TABLES or not _exists(path)), None)
-        if wrong is not None or not paths:
-            raise InputError(f"Expected tables that exist, as several sources are files of one table. Received: {wrong}. Give one source.")
-        return read_table_channels(paths if len(paths) > 1 else paths[0], columns, time, options)
-    source = os.fspath(source)
-    if source.startswith("influxdb://"):
-        return _read_influx(source, columns, time)
-    path = Path(source)
-    if not _exists(path):
-        raise InputError(f"Expected a source of telemetry. Received: {source}, which does not exist. Give {SOURCES}.")
+    path = existing(source)
+    if isinstance(path, str):
+        return _read_influx(path, columns, time)
+    if isinstance(path, list):
+        return read_table_channels(path if len(path) > 1 else path[0], columns, time, options)
     if path.is_dir() or path.suffix.lower() in TABLES:
         return read_table_channels(path, columns, time, options)
     if path.suffix.lower() == ".npy":
         return read_array_channels(path, columns, time)
     raise InputError(f"Expected a source of telemetry. Received: {path.name}. Give {SOURCES}.")
-
-
-def _exists(path: Path) -> bool:
-    try:
-        return path.exists()
-    except (OSError, ValueError):  # a name that the file system does not allow
-        return False
 
 
 def _read_influx(source: str, columns: list[str] | None, time: str | None) -> Channels:

@@ -71,20 +71,6 @@ def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[
     return blocks
 
 
-def disjoint_rows(starts: np.ndarray, window: int) -> np.ndarray:
-    """Chooses windows that share no sample: each is the first that begins after the end of the one before it.
-
-    Returns:
-        Indices of the chosen windows, in the order of time.
-    """
-    chosen, end = [], -np.inf
-    for row in np.argsort(starts, kind="stable").tolist():
-        if starts[row] >= end:
-            chosen.append(row)
-            end = starts[row] + window
-    return np.array(chosen, np.int64)
-
-
 def runs_of(marks: np.ndarray) -> list[tuple[int, int]]:
     """Returns the first sample and the end (exclusive) of each run of true samples, of marks of shape `(samples,)`."""
     edges = np.flatnonzero(np.diff(np.asarray(marks, bool), prepend=False, append=False))

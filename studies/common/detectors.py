@@ -1,4 +1,4 @@
-"""Detectors of the studies, beside those of the tool: neighbours, a support vector machine, and two autoencoders.
+"""Detectors of the studies, beside those of the tool: neighbours, a forest, a support vector machine, and two autoencoders.
 
 Keras is imported only when an autoencoder is trained.
 """
@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from enhsim_tf.common.two_sample import window_features
 from enhsim_tf.detection import registry
-from enhsim_tf.detection.detectors import features, flat
+from enhsim_tf.detection.detectors import flat
 
 
 class Detector(Protocol):
@@ -21,6 +22,29 @@ class Detector(Protocol):
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns one anomaly score for each window, shape `(windows,)`; higher is more anomalous."""
+
+
+def features(windows: np.ndarray) -> np.ndarray:
+    """The features of `window_features` of each channel."""
+    return window_features(windows.swapaxes(1, -1).reshape(-1, windows.shape[1])).reshape(len(windows), -1)
+
+
+class IsolationForestOnFeatures:
+    """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`."""
+
+    def __init__(self, seed: int = 0):
+        self.seed = seed
+
+    def fit(self, windows: np.ndarray) -> "IsolationForestOnFeatures":
+        """Fits the forest to nominal windows."""
+        from sklearn.ensemble import IsolationForest
+
+        self._forest = IsolationForest(n_estimators=200, random_state=self.seed).fit(features(windows))
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the anomaly score of the forest."""
+        return -self._forest.score_samples(features(windows))
 
 
 class NearestNeighbours:
@@ -142,7 +166,7 @@ DETECTORS: dict[str, Callable[[int], Any]] = {
     "limit check": registry.DETECTORS["limit check"],
     "PCA residual": registry.DETECTORS["PCA residual"],
     "nearest neighbours": lambda seed: NearestNeighbours(),
-    "isolation forest": registry.DETECTORS["isolation forest"],
+    "isolation forest": lambda seed: IsolationForestOnFeatures(seed),
     "one-class SVM": lambda seed: OneClassSVMOnFeatures(),
     "dense autoencoder": lambda seed: DenseAutoencoder(seed=seed),
     "convolutional autoencoder": lambda seed: ConvolutionalAutoencoder(seed=seed),

@@ -25,6 +25,7 @@ class KeptTables:
         command: The command that produces them.
         digits_of: Decimals of tables that differ from `digits`.
         kind: Word for messages.
+        former: Names of tables that the command no longer makes, which are read where they are published.
     """
 
     names: tuple[str, ...]
@@ -33,6 +34,7 @@ class KeptTables:
     command: str
     digits_of: Mapping[str, int] = dataclasses.field(default_factory=dict)
     kind: str = "study"
+    former: tuple[str, ...] = ()
 
     def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
         """Writes tables by name to a folder: labels as dictionaries, and numbers rounded to the precision that their counts support."""
@@ -57,7 +59,8 @@ class KeptTables:
         missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
         if missing:
             raise InputError(f"Expected the tables of the {self.kind} in {folder}. Received: no {missing[0]}.parquet. Run {self.command}.")
-        tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in self.names}
+        there = [*self.names, *(name for name in self.former if (folder / f"{name}.parquet").is_file())]
+        tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in there}
         for table in tables.values():
             for column in set(self.labels) & set(table.columns):
                 table[column] = table[column].astype(str)  # categories back to strings

@@ -9,11 +9,11 @@ import numpy as np
 
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.windows import random_window_starts
 from studies.common import detectors, evaluation
+from studies.common.gaussian_noise import GaussianNoise
 from studies.factorial.cells import (
     AUTOREGRESSION,
     DETECTORS,

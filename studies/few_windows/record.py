@@ -19,10 +19,10 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.noise.candidates import fit_candidate
 from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import evenly_spaced_starts, time_blocks
+from studies.common.gaussian_noise import fit_candidate
 
 REAL, CORAL = "real", "CORAL"
 SIMULATOR = "simulator + "
@@ -69,7 +69,7 @@ class Record:
         """Generates windows of the simulator with noise of one of `NOISE_MODELS`; `purpose` is the number of the random draw."""
         rng = np.random.default_rng([self.seed, purpose])
         clean = self.enhance(self._coarse(rng.integers(0, _START_RANGE, num_windows)))
-        model = fit_candidate(name, *(each[:, :, None] for each in self.residuals), self.starts)
+        model = fit_candidate(name, *(each[:, :, None] for each in self.residuals))
         return clean + model.generate(num_windows, rng, clean[:, :, None])[:, :, 0]
 
 

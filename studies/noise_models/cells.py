@@ -4,7 +4,6 @@ The noise models learn the true noise, so that errors of the enhancer have no ef
 generated noise and judged on nominal windows with real noise, as in the study of robustness.
 """
 
-import dataclasses
 import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,11 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.noise.candidates import NoiseModel
-from enhsim_tf.noise.names import CANDIDATES
-from enhsim_tf.simulator.noise_choice import MOST_JUDGED, HeldOutJudge, NoiseWindows
+from enhsim_tf.noise.window_bootstrap import NoiseModel
 from studies.common import evaluation
 from studies.common.detectors import DETECTORS
+from studies.common.gaussian_noise import CANDIDATES, fit_candidate
 from studies.common.settings import Settings
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 from studies.noise_models.real_floor import RealFloor, Row
@@ -32,7 +30,7 @@ MODELS = (*CANDIDATES, LEARNT)
 _NUM_DRAWS = 3  # of as many generated windows as there are real ones: measures of realism are means over them
 # numbers of random draws, and the names of draws below, are those of the published tables
 _STREAMS = {"none": 0, "gaussian": 1, "autoregression": 2, "residual windows": 3, "matched residual windows": 7, LEARNT: 8}
-_DRAW, _DRAW_OF_JUDGE = 71, 73
+_DRAW = 71
 
 
 class Cell:
@@ -70,15 +68,15 @@ class Cell:
         if model == REAL:
             number = self.settings.robustness.num_windows
             arms = [self.example.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
-            compared, choice = [held_out], []
+            compared = [held_out]
         else:
-            arms, compared, choice = self._generated(model, len(held_out))
-        for name, rows in {"detectors": self._detected(arms), "realism": _measured(floor, compared), "choice": choice}.items():
+            arms, compared = self._generated(model, len(held_out))
+        for name, rows in {"detectors": self._detected(arms), "realism": _measured(floor, compared)}.items():
             table = pd.DataFrame(rows).assign(family=self.settings.noise, seed=self.settings.seed, model=model)
             table.to_parquet(folder / f"{name}.parquet")
 
-    def _generated(self, name: str, number: int) -> tuple[list[np.ndarray], list[np.ndarray], list[dict]]:
-        """Windows that train detectors and set their thresholds, draws of noise for the measures of realism, and the judgement of `fit`."""
+    def _generated(self, name: str, number: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Windows that train detectors and set their thresholds, and draws of noise for the measures of realism."""
         model, seed = self._fit(name), self.settings.seed
         rng = np.random.default_rng([seed, _STREAMS[name], _DRAW])
         purposes = ("ladder, training", "ladder, threshold")
@@ -87,14 +85,14 @@ class Cell:
         more = self.example.windows("calibration", number, "ladder, realism")["truth"]
         # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
         compared = [more + model.generate(number, rng, more[:, :, None])[:, :, 0] - more for _ in range(_NUM_DRAWS)]
-        judgement = self._judge.judge(name, model, np.random.default_rng([seed, _DRAW_OF_JUDGE, _STREAMS[name]]))
-        return arms, compared, [{key: value for key, value in dataclasses.asdict(judgement).items() if key != "name"}]
+        return arms, compared
 
     def _fit(self, name: str) -> NoiseModel:
+        noise, clean, starts = self._learnt
         if name != LEARNT:
-            return self._learnt.fit(name)
+            return fit_candidate(name, noise, clean)
         learner = MixtureDensityNoise(self.settings.seed, self.settings.noise_models.num_steps)
-        return _OneChannel(learner.fit(self._learnt.noise[:, :, 0], self._learnt.clean[:, :, 0], self._learnt.starts))
+        return _OneChannel(learner.fit(noise[:, :, 0], clean[:, :, 0], starts))
 
     def _floor(self) -> tuple[RealFloor, np.ndarray]:
         """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample."""
@@ -117,20 +115,11 @@ class Cell:
         return rows
 
     @functools.cached_property
-    def _learnt(self) -> NoiseWindows:
-        """Windows of the training part, from which the models learn."""
-        return self._with_noise("train", self.settings.noise_models.num_windows, "ladder, learnt")
-
-    def _with_noise(self, part: str, number: int, purpose: str) -> NoiseWindows:
-        windows = self.example.windows(part, number, purpose)
+    def _learnt(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Windows of noise of the training part, from which the models learn, the signal below them, and their first samples."""
+        windows = self.example.windows("train", self.settings.noise_models.num_windows, "ladder, learnt")
         target, truth = (windows[name][:, :, None] for name in ("target", "truth"))
-        return NoiseWindows(target - truth, truth, windows["start"])
-
-    @functools.cached_property
-    def _judge(self) -> HeldOutJudge:
-        """Judges noise models as `fit` does, by windows of the same telemetry that they have not seen."""
-        number = min(MOST_JUDGED, self.settings.noise_models.num_windows)
-        return HeldOutJudge(self._learnt, self._with_noise("calibration", number, "ladder, judged"), self.settings.seed)
+        return target - truth, truth, windows["start"]
 
 
 class _OneChannel:

@@ -20,9 +20,9 @@ from threadpoolctl import threadpool_limits
 from enhsim_tf.common import measures as fidelity
 from enhsim_tf.common import two_sample
 from enhsim_tf.common.two_sample import window_features
-from enhsim_tf.simulator.noise_choice import DECIMALS
 from studies.noise_models import distances
 
+_DECIMALS = 4  # in standard deviations of the noise; smaller differences are rounding errors of 32-bit telemetry
 _BLOCK = 10  # consecutive windows that stay together when the windows are split
 
 
@@ -154,7 +154,7 @@ class RealFloor:
     def _standardised(self, windows: np.ndarray) -> np.ndarray:
         """The first `num_windows` windows, standardised by the real windows and rounded."""
         standardised = (np.asarray(windows[: self.num_windows], np.float64) - self._offset) / self._unit
-        return np.round(standardised, DECIMALS).astype(np.float32)
+        return np.round(standardised, _DECIMALS).astype(np.float32)
 
     def _resplits(self, num_resplits: int, rng: np.random.Generator) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yields pairs of index arrays. Blocks in time are assigned to the halves at random; each half keeps the order of time."""

@@ -1,6 +1,5 @@
 """End-to-end tests of the commands, and their error messages for invalid input."""
 
-import argparse
 import json
 import os
 import re
@@ -16,19 +15,17 @@ import pytest
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
-from enhsim_tf.cli import fit
 from enhsim_tf.cli.arguments import parse
 from enhsim_tf.cli.checks import cleaning_options
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.simulator.model_folder import channels_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.known_simulators import of_waves
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "enhsim_tf"]
-TINY = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "gaussian"]
+TINY = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "residual-windows"]
 
 
 def table(num_samples=1_500):
@@ -62,7 +59,6 @@ def world(tmp_path_factory):
     table()[["utc", "volts"]].to_csv(folder / "one.csv", index=False)
     dirty().to_csv(folder / "dirty.csv", index=False)
     pd.DataFrame({"volts": np.ones(1_500), "amps": np.arange(1_500) % 2 * 0.0}).to_csv(folder / "still.csv", index=False)
-    (folder / "mix.yaml").write_text("windows: 10\nseed: 1\n")
     for name in ("volts", "amps"):
         small(name).save(folder / "models" / name)
     small("volts").save(folder / "single" / "volts")
@@ -191,7 +187,7 @@ def test_fit_prints_the_cleaning_and_the_report(fitted):
         "filled by straight lines",
         "values that cannot be read, taken as missing: 1",
         "volts: signal: error",
-        "volts: noise: gaussian",
+        "volts: noise: residual windows",
         "of held-out time",
         "score uses: ",
         "models/volts/",
@@ -216,10 +212,8 @@ def test_generate_writes_training_data_with_a_fitted_simulator(fitted, told, tmp
     assert third.startswith("volts: drift at 1: 100% of such")
     frame = pd.read_parquet(tmp_path / "deep" / "training.parquet")
     changed = np.stack(frame["mask"]).any(axis=1)
-    assert (
-        not changed[:20].any()
-        and (frame["scenario"] == np.where(changed, np.repeat(["", "stuck", "drift"], [20, 10, 10]), "nominal")).all()
-    )
+    assert ((frame["scenario"] == "nominal") == ~changed).all() and (frame["scenario"] == "drift").sum() == 10
+    assert 0 < (frame["scenario"] == "stuck").sum() <= 10
     assert frame["onset"].min() >= 16 - 4 and np.stack(frame["window"]).shape == (40, 64)
     assert 10 < np.stack(frame["window"]).mean() < 30  # in the telemetry's unit
 
@@ -311,7 +305,9 @@ def test_a_simulator_of_several_channels_has_one_file(told, tmp_path):
 
 def test_inject_writes_labelled_telemetry(told, tmp_path):
     place = ["--at", "level_shift:8@2024-01-01T02:00/5min"]
-    code, out, errors = told("inject", "WORLD/one.csv", "--kinds", "all", "--length", "20:60", *place, "--seed", 3, "--out", "x.parquet")
+    arguments = ["--kinds", "all", "--length", "20:60", *place, "--seed", 3, "--figure", "--out", "x.parquet"]
+    code, out, errors = told("inject", "WORLD/one.csv", *arguments)
+    assert {path.name for path in tmp_path.iterdir()} == {"x.parquet", "x.png"}
     assert code == 0 and not errors and "9 anomalies" in out and "noise sd 0.19" in out
     frame = pd.read_parquet(tmp_path / "x.parquet")
     assert list(frame) == ["time", "value", "scenario", "severity", "onset", "end", "mask"]
@@ -326,7 +322,7 @@ def test_inject_writes_one_timeeval_file_or_one_file_for_each_channel(told, tmp_
     code, _, errors = told("inject", "WORLD/two.csv", "--kinds", "ramp", "--timeeval", "--out", "single")
     assert code == 0 and not errors and sorted(path.name for path in (tmp_path / "single").iterdir()) == ["amps.csv", "volts.csv"]
     code, out, errors = told("inject", "WORLD/two.csv", "--kinds", "delay", "--out", "both.parquet")
-    assert code == 0 and not errors and "delay of " in out and "volts, amps: " in out
+    assert code == 0 and not errors and "volts, amps: 1 anomaly, 100 samples of 1,500 changed" in out
     assert list(pd.read_parquet(tmp_path / "both.parquet"))[-2:] == ["mask volts", "mask amps"]
 
 
@@ -361,13 +357,6 @@ def test_a_fit_that_fails_says_it_once_and_leaves_no_new_folder(told, tmp_path):
     code, _, errors = told("fit", "WORLD/two.csv", "--coarse", "RUNS/later.csv", "--out", "old/new/models")
     assert (code, len(errors)) == (2, 1) and errors[0].startswith("error: volts, amps: Expected a coarse run that overlaps")
     assert [path.name for path in tmp_path.rglob("*")] == ["old", "empty"]
-
-
-def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
-    monkeypatch.setattr(fit, "_cleaned", lambda *arguments: {}["defect"])
-    outcome = fit.fit_or_say({"volts": None}, Path("x"), argparse.Namespace(cleaning=Cleaning()), None, None)
-    line = outcome.failed["volts"]
-    assert not outcome.reports and len(line.splitlines()) == 1 and "KeyError" in line and "'defect'" in line
 
 
 def test_several_sources_and_what_reading_takes_are_options():
@@ -446,7 +435,7 @@ def test_the_commands_of_the_pages_can_be_parsed():
 def test_the_python_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
     page = (ROOT / "docs" / "own_data.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in page.split("```python")[1:] if "fit(" in part.partition("```")[0]]
-    tiny = "FitOptions(window=64, num_windows=40, enhancer='ridge', noise='gaussian')"
+    tiny = "FitOptions(window=64, num_windows=40, enhancer='ridge', noise='residual windows')"
     assert "FitOptions(seed=0)" in snippet and "num_windows=1000" in snippet
     snippet = snippet.replace("FitOptions(seed=0)", tiny).replace("num_windows=1000", "num_windows=20")
     table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)
@@ -471,7 +460,14 @@ WRONG = {
     "fit into a file": (["fit", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv"),
     "fit into a foreign folder": (["fit", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
     "no windows of a large data set": ([*GENERATE, "--workers", "1"], "--windows"),
-    "scenarios in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--scenario", "stuck:0.5"], "--scenario"),
+    "more scenarios than windows": (
+        [*GENERATE, "--windows", "2", "--scenario", "stuck:0.5", "--scenario", "drift:1"],
+        "each of 2 scenarios",
+    ),
+    "a range of onsets of events": (
+        [*GENERATE, "--continuous", "1d", "--number", "3", "--scenario", "stuck:1:0.1-0.5"],
+        "a range of onsets",
+    ),
     "neither windows nor a length": (GENERATE, "--windows"),
     "no windows": ([*GENERATE, "--windows", "0"], "--windows 0"),
     "share out of range": ([*GENERATE, "--windows", "5", "--scenario", "stuck:0.5", "--nominal-share", "2"], "2.0"),
@@ -497,7 +493,7 @@ WRONG = {
     ),
     "telemetry and run swapped": (
         ["score", "RUNS/models", "RUNS/run.csv", "--column", "volts", "--coarse", "RUNS/new.csv", "--out", "x.csv"],
-        "Swap the two.",
+        "Expected a channel of new.csv: celsius. Received: 'volts'.",
     ),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
     "update where a simulator is": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/models"], "--replace"),
@@ -516,6 +512,11 @@ WRONG = {
     "scores without a run": (["score", "RUNS/models", "RUNS/new.csv", "--out", "x.parquet"], "Expected --coarse"),
     "a run of another time": (["score", "RUNS/models", "RUNS/new.csv", "--coarse", "RUNS/later.csv", "--out", "x.parquet"], "in time"),
     "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
+    "inject at a severity that has no effect": (
+        ["inject", "WORLD/two.csv", "--kinds", "delay,another_time", "--severity", "4", "--out", "x.csv"],
+        "Received: --severity. Leave it out.",
+    ),
+    "inject a joint kind at a place": ([*INJECT, "--kinds", "delay", "--at", "ramp@1/5"], "--at with delay"),
     "inject an unknown kind": (
         [*INJECT, "--kinds", "spikes,delay"],
         "gain, another_time, delay, lost_coupling, common_shift. Received: 'spikes'",

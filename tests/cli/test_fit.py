@@ -11,7 +11,7 @@ from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.simulator.conftest import joint, series
 
-OPTIONS = FitOptions(window=64, num_windows=100, enhancer="ridge", noise="gaussian")
+OPTIONS = FitOptions(window=64, num_windows=100, enhancer="ridge", noise="residual windows")
 
 
 def table(**more):
@@ -48,32 +48,24 @@ def test_separate_simulators_have_the_same_bytes_in_this_process_and_in_another(
     assert sums[0] == sums[1]
 
 
-def test_two_folders_of_one_name_are_refused(tmp_path, refused):
-    for name in ("a b", "a%20b"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "manifest.json").touch()
-    with refused("two of one name"):
-        models_of(tmp_path)
-
-
 def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
     fast = pd.Series(series(6_000).values, pd.date_range("2024-01-01", periods=6_000, freq="1s", tz="UTC"))
     reports, failed, _ = fitted(tmp_path, table() | {"fast": fast})
     assert sorted(reports) == ["fast", "volts~watts"] and not failed
 
 
-def test_a_channel_that_kills_its_worker_is_reported_and_stops_no_other(tmp_path, monkeypatch):
+def test_a_channel_that_kills_its_workers_is_reported_and_stops_no_other(tmp_path, monkeypatch):
     tried = []
 
     def run(engine, work, groups, workers):
         names = [name for (name,) in groups]
-        tried.append((names, workers))
-        for place, name in enumerate(names):
+        tried.append(names)
+        for name in names:
             if name == "bad":
-                raise ProcessesDiedError(groups[place : place + 2])
+                raise ProcessesDiedError([{name: None}])
             yield fit.Outcome(name, lines=[name])
 
     monkeypatch.setattr(fit.engines, "run", run)
     _, failed, lines = fitted(tmp_path, dict.fromkeys(["a", "bad", "c", "d"]), separately=True, workers=4)
-    assert list(failed) == ["bad"] and "memory" in failed["bad"] and lines == ["a", "c", "d"]
-    assert tried == [(["a", "bad", "c", "d"], 4), (["c"], 1), (["bad"], 1), (["d"], 4)]
+    assert list(failed) == ["bad"] and "Memory" in failed["bad"] and lines == ["a", "c", "d"]
+    assert tried == [["a", "bad", "c", "d"], ["c", "d"]]

@@ -33,8 +33,6 @@ def test_a_command_that_was_sent_only_in_held_out_time_does_not_hide_what_anothe
 
 
 def test_what_is_refused(sent, refused):
-    with refused("decay of 0 samples or more"):
-        CommandTraces([(1, -1.0)])
     with refused("at least 3 columns"):
         CommandTraces([(3, 8.0)]).traces(sent[:, :2])
     assert CommandTraces.fit(np.ones(4_000), np.zeros((4_000, 2))) is None

@@ -37,7 +37,7 @@ def test_a_loop_tells_how_far_it_is_at_most_every_fifteen_seconds():
 def test_a_fit_names_its_steps_where_it_is_asked_to(capsys):
     rng, told = np.random.default_rng(0), []
     telemetry = Telemetry((np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)).astype(np.float32))
-    options = FitOptions(window=60, num_windows=60, enhancer="ridge", noise="gaussian")
+    options = FitOptions(window=60, num_windows=60, enhancer="ridge", noise="residual windows")
     for progress in (SILENT, Progress(told.append, "volts: ")):
         fit(telemetry, options=options, progress=progress)
         assert capsys.readouterr() == ("", ""), "its lines go where they were asked for"

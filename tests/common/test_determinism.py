@@ -12,7 +12,6 @@ import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
 from tests.known_simulators import of_waves
 
 ROOT = Path(__file__).parents[2]
@@ -27,8 +26,7 @@ def model(tmp_path):
     kernels = [(rng.standard_normal(size) / np.sqrt(size[0])).astype(np.float32) for size in ((120, 256), (256, 256), (256, 120))]
     layers = tuple((kernel, np.zeros(kernel.shape[1], np.float32)) for kernel in kernels)
     enhancer = Enhancer("network", 120, 1, 1, np.zeros(1, np.float32), np.zeros(120, np.float32), (), layers)
-    noise = GaussianNoise(np.eye(1), 120, [GaussianAutoregression([0.5], 1.0)])
-    of_waves([SquareWaveSimulator([SquareWave(480, low=-1.0, high=1.0)])], 120, interval_s=2.0, enhancer=enhancer, noise=noise).save(folder)
+    of_waves([SquareWaveSimulator([SquareWave(480, low=-1.0, high=1.0)])], 120, interval_s=2.0, enhancer=enhancer).save(folder)
     return folder
 
 

@@ -1,6 +1,5 @@
 """Large data sets: identical bytes after any interruption, detection of damage, and reading of the files."""
 
-import itertools
 import json
 import os
 import re
@@ -13,18 +12,21 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.common import console
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.datasets import generate
+from enhsim_tf.datasets import plan as plan_module
 from enhsim_tf.datasets.folder import find_problems, locked
 from enhsim_tf.datasets.generate import generate_data_set
-from enhsim_tf.datasets.mix import Mix, read_mix
+from enhsim_tf.datasets.places import ScenarioRange
 from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.datasets.shard import Record, shard_file
-from tests.small_data_set import PlainMaker, plain, plan
+from enhsim_tf.datasets.shard import shard_file
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from tests.small_data_set import SCENARIOS, PlainMaker, plain, plan
 
 ROOT = Path(__file__).parents[2]
 COMMAND = ROOT / "tests" / "small_data_set.py"
@@ -102,33 +104,24 @@ def test_damaged_and_missing_shards_are_found_and_generated_again(damage, damage
     assert content_of(folder) == content_of(undisturbed) and not list(find_problems(folder))
 
 
-def begun(folder, undisturbed, done=(0, 1, 2, 5), tail=b""):
+def begun(folder, undisturbed, done=(0, 1, 2, 5)):
     """Makes an unfinished data set, as left by a killed run."""
-    records = json.loads((undisturbed / "_manifest.json").read_text())["shards"]
     change_manifest(copy_of(undisturbed, folder), lambda manifest: manifest.update(shards=None))
-    lines = [json.dumps([shard, 50, records[shard]["sha256"]]).encode() + b"\n" for shard in done]
-    (folder / "_journal.jsonl").write_bytes(b"".join(lines) + tail)
     for shard in set(range(20)) - set(done):
         (folder / shard_file(shard)).unlink()
     (folder / f".{shard_file(9)}.0123abcd.enhsim_tf.parquet").write_bytes(b"half")
     return folder
 
 
-@pytest.mark.parametrize(
-    "tail",
-    [
-        b"",
-        b"[6, 50",
-        b'[7, 50, "0"]\n',
-        b"\xff\x00\n[]\n[8]\n[1e999,1,1]\n" + b"[" * 5_000 + b"\n",
-        b'[99, 50, "a"]\n[true, 50, "a"]\n',
-    ],
-)
-def test_a_run_resumes_after_the_finished_shards(tail, undisturbed, tmp_path, here):
-    folder = begun(tmp_path / "set", undisturbed, tail=tail)
-    assert next(find_problems(folder)).startswith("not finished")
-    told(folder, plan())
-    assert here == [shard for shard in range(20) if shard not in (0, 1, 2, 5)]
+def test_a_run_resumes_after_the_finished_shards(undisturbed, tmp_path, here):
+    folder = begun(tmp_path / "set", undisturbed)
+    PlainMaker(plan(seed=4), folder)(1)  # of another plan
+    PlainMaker(plan(130), folder)(2)  # of the same one, but shorter
+    (folder / shard_file(3)).write_bytes((folder / shard_file(5)).read_bytes()[:-9])
+    (folder / shard_file(4)).write_bytes(b"")
+    assert list(find_problems(folder)) == ["not finished: 6 of 20 shards are there; run the same `generate` again"]
+    assert told(folder, plan())[0].startswith("2 of 20 shards")
+    assert here == [shard for shard in range(20) if shard not in (0, 5)]
     assert content_of(folder) == content_of(undisturbed)
 
 
@@ -137,17 +130,7 @@ def test_a_long_run_says_how_far_it_is(tmp_path, monkeypatch, here):
     assert any(line.startswith("window 500 of 1,000, 50 %, about ") for line in told(tmp_path / "set", plan()))
 
 
-def test_a_journal_continues_after_an_incomplete_line(undisturbed, tmp_path, monkeypatch, here):
-    folder = begun(tmp_path / "set", undisturbed, tail=b'[3, 50, "01')
-    monkeypatch.setattr(generate.engines, "run", lambda engine, work, numbers, workers: serial(engine, work, itertools.islice(numbers, 3)))
-    with pytest.raises(KeyError):  # this engine stops after three shards
-        told(folder, plan())
-    monkeypatch.setattr(generate.engines, "run", serial)
-    assert told(folder, plan())[0].startswith("7 of 20 shards")
-    assert content_of(folder) == content_of(undisturbed)
-
-
-@pytest.mark.parametrize("content", [b"{", b"[]", b"\xff", b'{"format": "enhsim_tf.datasets.generate/4", "settings": {}}'])
+@pytest.mark.parametrize("content", [b"{", b"[]", b"\xff", b'{"format": "enhsim_tf.datasets.generate/5", "settings": {}}'])
 def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)
@@ -157,15 +140,8 @@ def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp
     assert not here
 
 
-def test_a_shard_that_does_not_match_its_record_is_an_error(undisturbed, tmp_path, here, refused):
-    folder = copy_of(undisturbed, tmp_path / "set")
-    change_manifest(folder, lambda manifest: manifest["shards"][4].update(sha256="0" * 64))
-    with refused(shard_file(4), "computes different results"):
-        generate_data_set(folder, plan())
-
-
 def test_a_shard_written_to_the_disk_of_another_machine_is_an_error(tmp_path, monkeypatch, refused):
-    monkeypatch.setattr(generate.engines, "run", lambda *arguments: (record for record in [Record(3, 50, "0" * 64)]))
+    monkeypatch.setattr(generate.engines, "run", lambda *arguments: (each for each in [(3, "0" * 64)]))
     with refused(shard_file(3), "all machines share"):
         generate_data_set(tmp_path / "set", plan())
 
@@ -190,10 +166,11 @@ def test_a_folder_is_held_against_the_same_process_too_and_let_go_of(tmp_path, r
         (plan(seed=4), ["seed", "3", "4"]),
         (plan(2_000), ["windows", "1000", "2000"]),
         (plan(shard=100), ["shard"]),
-        (plan(mix=Mix()), ["nominal"]),
+        (plan(nominal=0.4), ["nominal"]),
+        (plan(scenarios=SCENARIOS[:1]), ["scenarios", 'Received: [{"mode": "stuck"']),
         (plan(checksum="1" * 64), ["model"]),
     ],
-    ids=["seed", "windows", "shard", "mix", "model"],
+    ids=["seed", "windows", "shard", "nominal", "scenarios", "model"],
 )
 def test_a_data_set_with_other_settings_is_left_unchanged(other, words, undisturbed, tmp_path, here, refused):
     folder = begun(tmp_path / "set", undisturbed)
@@ -211,11 +188,10 @@ def test_a_folder_with_other_content_is_left_unchanged(name, tmp_path, here, ref
     assert [path.name for path in tmp_path.iterdir()] == [name] and not here
 
 
-@pytest.mark.parametrize("extra", ["shard-000020.parquet", "_journal.jsonl"])
-def test_verify_names_unexpected_files(extra, undisturbed, tmp_path):
+def test_verify_names_unexpected_files(undisturbed, tmp_path):
     folder = copy_of(undisturbed, tmp_path / "set")
-    (folder / extra).touch()
-    assert list(find_problems(folder)) == [f"{extra}: not a file of this data set"]
+    (folder / "shard-000020.parquet").touch()
+    assert list(find_problems(folder)) == ["shard-000020.parquet: not a file of this data set"]
 
 
 # real faults
@@ -317,22 +293,33 @@ def models(tmp_path_factory):
     return folder
 
 
-def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monkeypatch, capsys):
-    mix = tmp_path / "mix.yaml"
-    mix.write_text("windows: 150\nshard: 50\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n")
-    assert main(["generate", str(models / "volts"), "--scenarios", str(mix), "--workers", "2", "--out", str(tmp_path / "set")]) == 0
-    assert capsys.readouterr().out.startswith("150 windows of 60 samples in 3 shards")
+def serially(folder, model, windows, scenarios, monkeypatch):
+    """Generates a data set of a saved simulator with the seed 5 in this process."""
     monkeypatch.setattr(generate.engines, "run", serial)
-    generate_data_set(tmp_path / "serial", make_plan(read_mix(mix), models / "volts", 5, 150), tell=lambda line: None)
-    assert content_of(tmp_path / "set") == content_of(tmp_path / "serial")
+    generate_data_set(folder, make_plan(EnhancedSimulator.load(model), model, scenarios, 0.5, windows, 5), tell=lambda line: None)
+    return folder
+
+
+def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(plan_module, "_SHARD", 50)
+    asked = ["generate", str(models / "volts"), "--windows", "150", "--scenario", "friction:0-1", "--seed", "5"]
+    assert main([*asked, "--workers", "2", "--out", str(tmp_path / "set")]) == 0
+    assert "volts: 150 windows of 60 samples in 3 shards in " in capsys.readouterr().out
+    expected = serially(tmp_path / "serial", models / "volts", 150, [ScenarioRange("friction", (0.0, 1.0))], monkeypatch)
+    assert content_of(tmp_path / "set") == content_of(expected)
     assert main(["verify", str(tmp_path / "set")]) == 0 and capsys.readouterr().out == "150 windows in 3 shards, all intact\n"
+    assert main([*asked, "--out", str(tmp_path / "one.parquet")]) == 0
+    one, parts = pd.read_parquet(tmp_path / "one.parquet"), pd.read_parquet(sorted(expected.glob("shard-*.parquet")))
+    np.testing.assert_allclose(np.stack(one.pop("window")), np.stack(parts.pop("window")), atol=1e-6)  # other threads may round otherwise
+    pd.testing.assert_frame_equal(one, parts)
 
 
 @pytest.mark.slow
 def test_a_run_goes_on_when_a_machine_of_its_cluster_is_lost(models, tmp_path, monkeypatch):
     cluster_utils = pytest.importorskip("ray.cluster_utils", reason="the optional extra ray is not installed")
-    (tmp_path / "mix.yaml").write_text("windows: 6000\nshard: 50\nseed: 5\n")
-    command = [sys.executable, "-m", "enhsim_tf", "generate", models / "volts", "--scenarios", tmp_path / "mix.yaml", "--engine", "ray"]
+    monkeypatch.setattr(plan_module, "_SHARD", 50)
+    script = "import sys\nfrom enhsim_tf.__main__ import main\nfrom enhsim_tf.datasets import plan\nplan._SHARD = 50\nsys.exit(main())"
+    command = [sys.executable, "-c", script, "generate", models / "volts", "--windows", "6000", "--seed", "5", "--engine", "ray"]
     cluster = cluster_utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     try:
         node = cluster.add_node(num_cpus=1)
@@ -345,9 +332,7 @@ def test_a_run_goes_on_when_a_machine_of_its_cluster_is_lost(models, tmp_path, m
         assert process.returncode == 0, error
     finally:
         cluster.shutdown()
-    monkeypatch.setattr(generate.engines, "run", serial)
-    generate_data_set(tmp_path / "serial", make_plan(read_mix(tmp_path / "mix.yaml"), models / "volts", 5, 6_000), tell=lambda line: None)
-    assert content_of(tmp_path / "set") == content_of(tmp_path / "serial")
+    assert content_of(tmp_path / "set") == content_of(serially(tmp_path / "serial", models / "volts", 6_000, [], monkeypatch))
 
 
 def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, capsys):
@@ -359,7 +344,7 @@ def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, c
     assert sorted(os.listdir(tmp_path / "both")) == ["amps", "volts"]
     assert content_of(tmp_path / "both" / "volts") == content_of(tmp_path / "one")
     settings = json.loads((tmp_path / "one" / "_manifest.json").read_text())["settings"]
-    assert (settings["seed"], settings["nominal"], settings["model"]["name"]) == (4, 0.5, "volts")
+    assert (settings["seed"], settings["nominal"], settings["channels"]) == (4, 0.5, ["volts"])
 
 
 # reading
@@ -375,8 +360,6 @@ def test_the_reading_examples_of_the_documentation_return_the_data_set(number, l
     assert f"import {library}" in code and len(DOCS) == 3
     names = {}
     exec(compile(code, "docs/large_data_sets.md", "exec"), names)
-    import pandas as pd
-
     table = pd.read_parquet(sorted(undisturbed.glob("shard-*.parquet")))
     windows, nominal = np.stack(table["window"]), (table["scenario"] == "nominal").to_numpy()
     if library == "pandas":

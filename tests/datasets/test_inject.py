@@ -1,14 +1,18 @@
 """Anomalies in a user's own telemetry: of one channel, of several, and the files that hold them."""
 
+import itertools
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.datasets.inject import inject_channel, inject_joint, join_injected
+from enhsim_tf.datasets.inject import inject, join_injected
 from enhsim_tf.datasets.inject_options import JOINT_KINDS, InjectOptions
 from enhsim_tf.datasets.label_columns import LABELS, series_table, write_table
+from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.telemetry.cleaning.clean import clean
+from enhsim_tf.telemetry.placing import draw_begin
 from enhsim_tf.telemetry.series import Telemetry
 
 
@@ -30,22 +34,57 @@ def test_labels_of_samples_by_hand():
     assert frame["end"].tolist() == [pd.NA, 4, pd.NA, 4, pd.NA, pd.NA, 8, 8]
 
 
-def test_marked_samples_are_the_changed_ones_and_events_have_their_labels():
+@pytest.mark.parametrize("seed", range(5))
+def test_marked_samples_are_the_changed_ones_and_anomalies_keep_within_parts_and_apart(seed):
     given = parts()
-    frame = inject_channel(given, InjectOptions(("level_shift", "stuck"), (2, 8), ("50", "20min"), 6, noise_sd=0.2, seed=5))
-    nominal = np.concatenate([part.values for part in given])
+    options = InjectOptions(tuple(INJECTIONS), (2, 8), ("10", "20min"), 9, ["ramp:5@1100/100"], noise_sd=0.2, seed=seed)
+    frame, nominal = inject(given, options), np.concatenate([part.values for part in given])
     assert list(frame) == ["value", *LABELS] and frame.index.name == "time" and len(frame) == 2_800
     np.testing.assert_array_equal(frame["mask"], frame["value"].to_numpy() != nominal)
     np.testing.assert_array_equal(frame["mask"], frame["scenario"] != "nominal")
-    events = frame[frame["mask"]].groupby(["onset", "end", "scenario"], observed=True)["severity"].nunique()
-    assert len(events) == 6 and (events == 1).all()
-    for onset, end, _ in events.index:
-        assert 1 <= end - onset <= 120 and frame["mask"].iloc[onset] and frame["mask"].iloc[end - 1]
-    assert frame["severity"][frame["mask"]].between(2, 8).all() and frame.attrs["noise_sd"] == 0.2
+    found, labelled = frame.attrs["anomalies"], frame[frame["mask"]]
+    columns = [labelled[name].drop_duplicates().tolist() for name in ("onset", "end", "severity")]
+    assert columns == [[each.begin for each in found], [each.end for each in found], [np.float32(each.severity) for each in found]]
+    assert sorted(each.kind for each in found) == sorted([*INJECTIONS, "spike", "ramp"])
+    assert all(2 <= each.severity <= 8 and each.length <= 120 and each.channel == "volts" for each in found)
+    assert all(before.end + 50 < after.begin for before, after in itertools.pairwise(found))
+    assert all(each.end <= 1_000 or each.begin >= 1_000 for each in found)  # the gap
+    assert frame["mask"].iloc[[place for each in found for place in (each.begin, each.end - 1)]].all()
+
+
+def test_given_anomalies_by_hand():
+    at = ["level_shift:4@100/50", "spike:8@1200/60", "dropout:2@150/10"]
+    frame, nominal = inject(parts(), InjectOptions(at=at, noise_sd=0.2)), np.concatenate([part.values for part in parts()])
+    change = frame["value"].to_numpy() - nominal
+    np.testing.assert_allclose(np.abs(change[100:150]), 0.8, rtol=1e-4)  # 4 sd of 0.2, up or down
+    np.testing.assert_allclose(frame["value"][150:160], nominal[150] - 0.4, rtol=1e-6)
+    assert np.flatnonzero(change).tolist() == [*range(100, 160), 1_200, 1_225, 1_250]
+    assert [(each.kind, each.begin, each.end) for each in frame.attrs["anomalies"]] == [
+        ("level_shift", 100, 150),
+        ("dropout", 150, 160),
+        ("spike", 1_200, 1_251),
+    ]
+
+
+def test_places_are_uniform_over_what_is_free():
+    rng = np.random.default_rng(0)
+    begins = [draw_begin([(0, 100)], [(0, 40)], 10, 10, rng) for _ in range(3_000)]
+    counts, expected = np.bincount(begins, minlength=100), 3_000 / 41
+    assert counts[:50].sum() == 0 and counts[91:].sum() == 0  # the free places are the 41 samples from 50 to 90
+    assert np.sum((counts[50:91] - expected) ** 2 / expected) < 80  # chi-squared with 40 degrees of freedom: above 80 at p = 0.0002
+
+
+def test_a_place_where_nothing_changes_is_drawn_again():
+    values = np.full(2_000, 7, np.float32)
+    values[1_500:] = parts()[0].values[:500]  # `stuck` changes nothing in the constant stretch before
+    for seed in range(10):
+        frame = inject([Telemetry(values)], InjectOptions(["stuck"], (np.inf, np.inf), ("50", "50"), noise_sd=0.2, seed=seed))
+        ((onset, end),) = {(each.begin, each.end) for each in frame.attrs["anomalies"]}
+        assert onset > 1_450 and frame["mask"].iloc[[onset, end - 1]].all()
 
 
 def test_the_noise_is_estimated_and_sets_the_severity():
-    frame = inject_channel(parts(), InjectOptions(at=["level_shift:5@200/100"]))
+    frame = inject(parts(), InjectOptions(at=["level_shift:5@200/100"]))
     assert frame.attrs["noise_sd"] == pytest.approx(0.2, rel=0.05)
     change = np.abs(frame["value"].to_numpy() - np.concatenate([part.values for part in parts()]))
     assert change[200:300] == pytest.approx(5 * frame.attrs["noise_sd"], rel=1e-4) and change[:200].max() == change[300:].max() == 0
@@ -53,14 +92,14 @@ def test_the_noise_is_estimated_and_sets_the_severity():
 
 def test_channels_draw_independently_and_the_same_seed_gives_the_same_table():
     options = InjectOptions(("spike",), number=3, seed=1)
-    first, again, amps = (inject_channel(parts(name=name), options) for name in ("volts", "volts", "amps"))
+    first, again, amps = (inject(parts(name=name), options) for name in ("volts", "volts", "amps"))
     pd.testing.assert_frame_equal(first, again)
     assert (amps["mask"].to_numpy() != first["mask"].to_numpy()).any()
 
 
 @pytest.mark.parametrize("times", [True, False])
 def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refused):
-    volts, amps = (inject_channel(parts(times, False, name), InjectOptions(("level_shift",), number=2)) for name in ("volts", "amps"))
+    volts, amps = (inject(parts(times, False, name), InjectOptions(("level_shift",), number=2)) for name in ("volts", "amps"))
     write_table(tmp_path / "x.csv", join_injected({"volts": volts, "amps": amps}), ["volts", "amps"])
     read = pd.read_csv(tmp_path / "x.csv")
     assert list(read) == ["timestamp", "volts", "amps", "is_anomaly"] and read["is_anomaly"].isin([0, 1]).all()
@@ -79,6 +118,7 @@ def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refuse
     [
         {},
         {"kinds": ["rust"]},
+        {"kinds": ["common_shift"], "severity": (np.inf, np.inf)},
         {"kinds": ["ramp"], "severity": (4, 2)},
         {"kinds": ["ramp"], "severity": (np.inf, np.inf)},
         {"kinds": ["stuck"], "severity": (1, np.inf)},
@@ -88,9 +128,6 @@ def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refuse
         {"kinds": ["ramp"], "noise_sd": 0},
         {"at": ["ramp"]},
         {"at": ["rust:4@5/5"]},
-        {"kinds": ["delay", "spike"]},
-        {"kinds": ["delay"], "at": ["ramp@1/5"]},
-        {"kinds": ["delay"], "noise_sd": 1.0},
     ],
 )
 def test_wrong_options_are_refused(wrong, refused):
@@ -106,11 +143,17 @@ def test_wrong_options_are_refused(wrong, refused):
         (parts(times=False, gap=False), {"at": ["ramp@2024-01-01/5"]}, "sample number"),
         (parts(), {"kinds": ["ramp"], "length": ("20min", "50")}, "20min:50"),
         ([Telemetry(np.arange(200, dtype=np.float32))], {"kinds": ["ramp"]}, "--noise-sd"),
+        (parts(), {"at": ["ramp@100/50", "gain@149/5"]}, "do not overlap. Received: ramp at 4 from sample 100 to 150"),
+        (parts(), {"at": ["ramp@990/20"]}, "2,800 samples in 2 parts"),
+        (parts(gap=False), {"kinds": ["ramp"], "length": ("1600", "1600"), "number": 2}, "3,000 samples with 1 event, nowhere"),
+        (parts(), {"at": ["dropout@10/5"], "noise_sd": 1e38}, "range of float32"),
+        (parts(), {"at": ["level_shift@10/5"], "noise_sd": 1e-9}, "changes no sample"),
+        ([Telemetry(np.ones(900, np.float32))], {"kinds": ["stuck"], "noise_sd": 1.0}, "changes nothing at 100 drawn places"),
     ],
 )
 def test_what_does_not_fit_the_telemetry_is_refused(given, options, word, refused):
     with refused(word):
-        inject_channel(given, InjectOptions(**options))
+        inject(given, InjectOptions(**options))
 
 
 # several channels
@@ -126,21 +169,21 @@ def together(channels=3):
 NOMINAL = np.concatenate([part.values for part in together().parts])
 
 
-@pytest.mark.parametrize("kind", JOINT_KINDS)
+@pytest.mark.parametrize("kind", [*JOINT_KINDS, "spike,delay,gain"])
 def test_samples_that_are_not_marked_keep_their_values(kind):
-    frame = inject_joint(together(), InjectOptions([kind], length=("40", "40"), number=3, seed=1))
+    frame = inject(together(), InjectOptions(kind.split(","), length=("40", "40"), number=3, seed=1))
     mask = frame[[f"mask {name}" for name in "abc"]].to_numpy()
     np.testing.assert_array_equal(mask, frame[list("abc")].to_numpy() != NOMINAL)
     np.testing.assert_array_equal(frame["mask"], mask.any(axis=1))
-    changed = {"a", "b", "c"} if kind == "common_shift" else {each[4] for each in frame.attrs["anomalies"]}
+    changed = set("abc") if kind == "common_shift" else {each.channel for each in frame.attrs["anomalies"]}
     assert len(frame.attrs["anomalies"]) == 3 and mask.any(axis=0).sum() == len(changed)
 
 
 def changed_by(kind, seed):
     """The changed samples of one anomaly: their first one, the number of the channel, and all channels."""
-    frame = inject_joint(together(), InjectOptions([kind], length=("40", "40"), seed=seed))
-    ((_, _, begin, end, name),) = frame.attrs["anomalies"]
-    return begin, "abc".find(name), frame[list("abc")].to_numpy()[begin:end]
+    frame = inject(together(), InjectOptions([kind], length=("40", "40"), seed=seed))
+    (found,) = frame.attrs["anomalies"]
+    return found.begin, "abc".find(found.channel or "abc"), frame[list("abc")].to_numpy()[found.begin : found.end]
 
 
 def test_a_channel_of_another_time_has_the_values_of_that_time():
@@ -162,14 +205,12 @@ def test_a_common_shift_has_the_severity_in_each_channel():
 
 def test_one_channel_is_refused(refused):
     with refused("several channels"):
-        inject_joint(together(1), InjectOptions(["delay"]))
+        inject(together(1), InjectOptions(["delay"]))
 
 
-def test_a_joint_anomaly_that_changes_nothing_is_drawn_again_or_refused(refused):
+def test_a_joint_anomaly_that_changes_nothing_is_drawn_again():
     values = NOMINAL[:, :2].copy()
     values[:, 1] = 7  # a constant channel that is late is as before
     for seed in range(5):
-        frame = inject_joint(Recording((Run(values),), ("a", "b"), name="ab"), InjectOptions(["delay"], number=3, seed=seed))
-        assert {each[4] for each in frame.attrs["anomalies"]} == {"a"}
-    with refused("changes nothing at 100 drawn places"):
-        inject_joint(Recording((Run(np.ones((900, 2), np.float32)),), ("a", "b"), name="ab"), InjectOptions(["delay"]))
+        frame = inject(Recording((Run(values),), ("a", "b"), name="ab"), InjectOptions(["delay"], number=3, seed=seed))
+        assert {each.channel for each in frame.attrs["anomalies"]} == {"a"}

@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.datasets.labelled_windows import draw_schedule
+from enhsim_tf.datasets.labelled_series import draw_schedule
 from enhsim_tf.datasets.places import (
     Place,
+    ScenarioRange,
     length_limits,
     parse_length,
     parse_num_samples,
@@ -22,7 +23,7 @@ from enhsim_tf.telemetry.placing import PlacedEvent
 from tests.known_simulators import of_waves
 from tests.small_data_set import COARSE, INTERVAL_S
 
-MODES = [Degraded("stuck", 1.0), Degraded("drift", 0.5)]
+MODES = [ScenarioRange("stuck", (1.0, 1.0)), ScenarioRange("drift", (0.3, 0.6))]
 SIMULATOR = of_waves([COARSE], 64, interval_s=INTERVAL_S)
 
 
@@ -33,6 +34,8 @@ def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
     assert sorted(event.kind for event in schedule) == ["drift"] * 4 + ["gain_loss"] + ["stuck"] * 4 and given[0] in schedule
     for before, after in itertools.pairwise(schedule):
         assert after.begin - before.end >= 80
+    drifts = [event.severity for event in schedule if event.kind == "drift"]
+    assert len(set(drifts)) == 4 and 0.3 <= min(drifts) < max(drifts) <= 0.6
     assert schedule[-1].end <= 3_000 and all(10 <= event.length <= 80 for event in schedule if event not in given)
     events = [(Degraded(event.kind, event.severity, 0.0), event.begin, event.end) for event in schedule]
     drawn = SIMULATOR.alignment.draw_series(3_000, events, np.random.default_rng(0))
@@ -53,7 +56,7 @@ def test_the_same_seed_gives_the_same_schedule_and_changes_that_fade_do_not_meet
 
 def test_events_that_change_nothing_or_do_not_fit_are_refused(refused):
     with refused("changes nothing at 100 drawn places"):
-        draw_schedule(SIMULATOR, 3_000, [], [Degraded("drift", 0.0)], 1, (10, 10), np.random.default_rng(0))
+        draw_schedule(SIMULATOR, 3_000, [], [ScenarioRange("drift", (0.0, 0.0))], 1, (10, 10), np.random.default_rng(0))
     with refused("room for events"):
         draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), np.random.default_rng(0))
 
@@ -64,14 +67,22 @@ def test_events_that_change_nothing_or_do_not_fit_are_refused(refused):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("stuck:0.5", Degraded("stuck", 0.5)),
-        ("drift:1:0", Degraded("drift", 1.0, 0.0)),
-        ("dropout:1e-2:0.99", Degraded("dropout", 0.01, 0.99)),
-        ("bus=2=stuck:0.5:0.1", Degraded("stuck", 0.5, 0.1, "bus=2")),
+        ("stuck:0.5", ScenarioRange("stuck", (0.5, 0.5), (0.25, 0.25))),
+        ("drift:1:0", ScenarioRange("drift", (1.0, 1.0), (0.0, 0.0))),
+        ("dropout:1e-2-1:0.1-0.99", ScenarioRange("dropout", (0.01, 1.0), (0.1, 0.99))),
+        ("bus=2=stuck:.2-5e-1:0.1", ScenarioRange("stuck", (0.2, 0.5), (0.1, 0.1), "bus=2")),
     ],
 )
 def test_scenarios_are_parsed(text, expected):
     assert parse_scenario(text) == expected
+
+
+def test_a_scenario_is_drawn_between_its_limits():
+    drawn = [parse_scenario("a=stuck:0.2-0.8:0.1-0.3").draw(rng) for rng in [np.random.default_rng(0)] for _ in range(2_000)]
+    for found, low, high in (([each.severity for each in drawn], 0.2, 0.8), ([each.onset for each in drawn], 0.1, 0.3)):
+        assert low <= min(found) and max(found) <= high and np.mean(found) == pytest.approx((low + high) / 2, abs=0.02 * (high - low) * 5)
+    assert {(each.mode, each.channel) for each in drawn} == {("stuck", "a")}
+    assert parse_scenario("stuck:0.5").draw(np.random.default_rng(0)) == Degraded("stuck", 0.5)
 
 
 def test_places_are_parsed():
@@ -119,7 +130,8 @@ def test_start_times_are_converted_to_utc():
 
 
 WRONG = {
-    parse_scenario: "|stuck|stuck:|stuck:half|stuck:0.5:|stuck:2|stuck:-0.1|stuck:nan|stuck:0.5:1|stuck:0.5:0.1:7|nominal:0.5",
+    parse_scenario: "|stuck|stuck:|stuck:half|stuck:0.5:|stuck:2|stuck:-0.1|stuck:nan|stuck:0.5:1|stuck:0.5:0.1:7|nominal:0.5|stuck:0.8-0.2"
+    "|stuck:0.2-|stuck:0.1-0.2-0.3|stuck:0.2-2|stuck:0.5:0.5-1",
     parse_length: "|0|-5|0s|-1d|nan|NaT|inf|long|1 fortnight|5000.5|1e3|²|1m|1d 6h|1.d|d|" + "9" * 5_000,
     parse_start: "|soon|01.02.2024|1066-10-14|9999-01-01|2024-13-01",
     parse_place: "stuck|stuck@5|stuck:x@5/5|@5/5|stuck:1@5/long",

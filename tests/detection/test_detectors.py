@@ -19,7 +19,6 @@ from enhsim_tf.detection.registry import DETECTORS, option_name
 MUST_SEE = {  # anomalies that each detector should find
     "limit check": ["spike", "noisy", "shifted"],
     "PCA residual": ["stuck", "noisy", "spike"],
-    "isolation forest": ["stuck", "noisy", "shifted"],
     "largest step": ["noisy", "spike", "shifted"],
     "moving deviation": ["spike", "shifted"],
     "innovation": ["stuck", "noisy", "spike", "shifted"],
@@ -76,10 +75,7 @@ def test_same_seed_same_scores(name):
     training, windows = one_channel(120, 0), one_channel(20, 1)
     first, again, other = (DETECTORS[name](seed).fit(training).score(windows) for seed in (3, 3, 4))
     assert (first == again).all()
-    if name == "isolation forest":
-        assert (first != other).any()
-    else:  # the PCA's solver is random, its components are not
-        np.testing.assert_allclose(first, other, rtol=0.1)
+    np.testing.assert_allclose(first, other, rtol=0.1)  # the PCA's solver is random, its components are not
 
 
 def test_names_on_the_command_line_differ():

@@ -1,15 +1,10 @@
 """What the files of this folder share: changed inputs, and the judgement of what a reader does with one.
 
-Every input is accepted, or refused with an `InputError` of one printable line, within 5 s of processor time and 1 GiB of memory. The slow
-tests try a few inputs of each reader, the same each time; `ENHSIM_TF_FUZZ=10000 python -m pytest --slow tests/fuzzing` tries as many others.
+Every input is accepted, or refused with an `InputError` of one printable line. The slow tests try a few inputs of each reader, the same each
+time; `ENHSIM_TF_FUZZ=10000 python -m pytest --slow tests/fuzzing` tries as many others.
 """
 
-import contextlib
-import copy
-import json
 import os
-import resource
-import signal
 import tempfile
 import warnings
 from pathlib import Path
@@ -21,16 +16,13 @@ from hypothesis import strategies as st
 from enhsim_tf.common.errors import InputError
 
 _LONG = int(os.environ.get("ENHSIM_TF_FUZZ", 0))
-_SECONDS, _BYTES, _MAX_CHARACTERS = 5, 2**30, 600
+_MAX_CHARACTERS = 600
 
 NASTY = (
     "", " ", ".", "..", "../../x", "/etc/passwd", "a\\b", "CON", "x" * 300, "\x00", "\n", "\r\n", "\x1b[31m", "\u202e", "é", "'\";--", "{}", "[]", "null",
     "nan", "-inf", "1e999", "-0", "1" * 400, "0x10", "1_000", "٣", "1.500,0", "9999-12-31T23:59:60Z", "0001-01-01", "2024-10-27 02:30:00", "=", ":", "%",
     "%ff", "&", "?", "#", "1:2:3", "1e-400", "*a", "&a", "!!python/object:os.system", "- ", "\t", '"', ",,,,", ";", "P1D", "-9223372036854775808",
 )  # fmt: skip
-_NUMBERS = (0, -1, 0.5, -0.0, 1e-320, 1e308, 10**9, 2**31, 2**63, 10**30, 10**400, float("nan"), float("inf"))
-_ODD = st.sampled_from([None, True, [], {}, [[]], {"": None}, [0] * 50, *_NUMBERS, *NASTY]).map(copy.deepcopy)
-_ANYTHING = _ODD | st.text(max_size=20) | st.integers()
 _PIECES = st.sampled_from([text.encode() for text in NASTY]) | st.binary(max_size=8)
 
 
@@ -46,28 +38,6 @@ def changed(draw, seeds):
     return data
 
 
-@st.composite
-def changed_json(draw, seeds):
-    """Valid JSON in which up to three values, at any depth, are replaced or dropped, or keys are added."""
-    content = json.loads(draw(st.sampled_from(seeds)))
-    for _ in range(draw(st.integers(0, 3))):
-        place, key = None, None
-        inner = content
-        while isinstance(inner, dict | list) and inner and (place is None or draw(st.booleans())):
-            place = inner
-            key = draw(st.sampled_from(sorted(inner) if isinstance(inner, dict) else range(len(inner))))
-            inner = place[key]
-        if place is None:
-            content = draw(_ANYTHING)
-        elif draw(st.booleans()):
-            place[key] = draw(_ANYTHING)
-        elif isinstance(place, dict) and draw(st.booleans()):
-            place[draw(st.text(max_size=8))] = draw(_ANYTHING)
-        else:
-            del place[key]
-    return json.dumps(content).encode()
-
-
 def tried(examples):
     """Settings of a slow test that tries that many inputs in an ordinary run."""
     number, checks = _LONG or examples, list(HealthCheck)
@@ -78,14 +48,14 @@ def tried(examples):
 def judge(read, *arguments):
     """Calls a reader with the arguments and an empty folder; any outcome but acceptance, True, and a good refusal, False, raises."""
     before = os.getcwd()
-    with tempfile.TemporaryDirectory() as folder, _limits(), warnings.catch_warnings():
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         warnings.simplefilter("error", UserWarning)  # as in all tests
         os.chdir(folder)
         try:
             read(*arguments, Path(folder))
         except InputError as error:
-            assert is_good(str(error)) and not _is_of_memory(error), repr(error)
+            assert is_good(str(error)), repr(error)
             return False
         finally:
             os.chdir(before)
@@ -104,34 +74,7 @@ def all_of(*calls):
         try:
             call()
         except InputError as error:
-            assert is_good(str(error)) and not _is_of_memory(error), repr(error)
+            assert is_good(str(error)), repr(error)
             refusals.append(error)
     if len(refusals) == len(calls):
         raise refusals[0]
-
-
-def _is_of_memory(error):
-    """Whether an error was caused by a MemoryError: input that is refused in time never allocates that much."""
-    while error is not None and not isinstance(error, MemoryError):
-        error = error.__context__
-    return error is not None
-
-
-@contextlib.contextmanager
-def _limits():
-    """Ends what takes too long, and refuses memory beyond the limit."""
-
-    def interrupt(number, frame):
-        raise KeyboardInterrupt(f"still running after {_SECONDS} s")  # which no reader catches
-
-    kept, handler = resource.getrlimit(resource.RLIMIT_AS), signal.signal(signal.SIGPROF, interrupt)
-    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() if Path("/proc/self/statm").exists() else None
-    if size:
-        resource.setrlimit(resource.RLIMIT_AS, (size + _BYTES, kept[1]))
-    signal.setitimer(signal.ITIMER_PROF, _SECONDS)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.signal(signal.SIGPROF, handler)
-        resource.setrlimit(resource.RLIMIT_AS, kept)

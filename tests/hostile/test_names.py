@@ -15,7 +15,7 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.simulator.model_folder import encode_name, folder_of, models_of
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.sources import read_source
-from tests.hostile.folders import settings_for, write_model
+from tests.small_data_set import plain
 
 NAMES = (
     "..", ".", "../../up", "/etc/passwd", "..\\..\\up", "C:\\up", "a/b", ".hidden", "CON", "nul", "com1", "LPT9", "Aux ", "trailing.", " lead",
@@ -70,7 +70,7 @@ COMMANDED = [name for name in NAMES if name == name.strip()]  # spaces around th
 @pytest.fixture
 def models(tmp_path):
     for name in COMMANDED:
-        write_model(folder_of(tmp_path / "world" / "models", name), settings_json=settings_for(name))
+        plain(channels=(name,)).save(folder_of(tmp_path / "world" / "models", name))
     assert set(models_of(tmp_path / "world" / "models")) == set(COMMANDED)
     return tmp_path / "world" / "models"
 
@@ -101,7 +101,7 @@ def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
     source, out = tmp_path / "world" / "x.parquet", tmp_path / "world" / "models"
     source.parent.mkdir()
     table_of([*names, "short\x1b[31m\n"], 1_500).assign(**{"short\x1b[31m\n": [1.0] * 2 + [np.nan] * 1_498}).to_parquet(source)
-    tiny = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "gaussian", "--separately", "--workers", "1"]
+    tiny = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "residual-windows", "--separately", "--workers", "1"]
     assert main(["fit", str(source), "--out", str(out), *tiny]) == 2  # one is too short
     made = files_below(tmp_path) - {source}
     assert {path.parent.parent for path in made} == {out} and {path.parent.name for path in made} == set(map(encode_name, names))

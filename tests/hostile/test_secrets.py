@@ -13,8 +13,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.model_folder import folder_of
 from enhsim_tf.telemetry.influx_store import parse_location
 from enhsim_tf.telemetry.sources import read_source
-from tests.hostile.folders import write_model
 from tests.hostile.test_names import table_of
+from tests.small_data_set import plain
 
 TOKEN, PASSWORD = "token-0123456789abcdef==", "pass-0123456789"
 
@@ -26,7 +26,7 @@ def named_cluster(pretended, monkeypatch):
 
 @pytest.fixture
 def world(tmp_path):
-    write_model(folder_of(tmp_path / "models", "volts"))
+    plain(channels=("volts",)).save(folder_of(tmp_path / "models", "volts"))
     table_of(["volts"]).to_csv(tmp_path / "x.csv", index=False)
     return tmp_path
 

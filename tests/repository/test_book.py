@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 
 import enhsim_tf
 from book import __main__ as command
@@ -18,15 +17,8 @@ from enhsim_tf.telemetry.reading.channels import Channels
 ROOT = Path(__file__).parents[2]
 
 
-def entries(node):
-    """Names of the files in a part of the table of contents, and its patterns."""
-    if isinstance(node, dict):
-        return [value for key, value in node.items() if key in ("root", "file", "glob")] + entries(list(node.values()))
-    return [name for part in node for name in entries(part)] if isinstance(node, list) else []
-
-
 def test_every_page_is_in_the_table_of_contents():
-    listed = entries(yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8")))
+    listed = re.findall(r"\b(?:root|file|glob): (\S+)", (ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
     patterns = {name for name in listed if "*" in name}
     assert {f"docs/{page.stem}" for page in (ROOT / "docs").glob("*.md")} <= set(listed)
     assert patterns == {"notebooks/*", "studies/*/README"}

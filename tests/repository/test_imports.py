@@ -52,6 +52,23 @@ def test_a_fit_generated_data_scores_and_anomalies_need_no_tensorflow(tmp_path):
     assert ended.returncode == 0, ended.stderr
 
 
+def test_a_missing_source_run_or_model_is_said_before_pandas_is_imported(tmp_path):
+    (tmp_path / "x.csv").write_text("a\n1\n")
+    commands = [
+        ["fit", "y.csv", "--out", "models"],
+        ["fit", "x.csv", "y.csv", "--out", "models"],
+        ["fit", "x.csv", "--coarse", "y.csv", "--out", "models"],
+        ["score", "models", "x.csv", "--out", "scores.csv"],
+    ]
+    script = f"import sys\nfrom enhsim_tf.__main__ import main\nassert [main(words) for words in {commands}] == [2] * 4\nassert 'pandas' not in sys.modules"
+    ended = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert ended.returncode == 0 and ended.stderr.count("error: ") == 4 and [path.name for path in tmp_path.iterdir()] == ["x.csv"], (
+        ended.stderr
+    )
+
+
 def test_public_names_resolve_to_their_objects():
     import enhsim_tf
 

@@ -9,7 +9,7 @@ from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.series import Telemetry
 
 PERIOD, WINDOW = 40, 80
-QUICK = FitOptions(window=WINDOW, num_windows=300, enhancer="ridge", noise="gaussian")
+QUICK = FitOptions(window=WINDOW, num_windows=300, enhancer="ridge", noise="residual windows")
 """Options that choose neither the enhancer nor the noise, which takes most of the time of a fit."""
 
 

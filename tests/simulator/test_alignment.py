@@ -111,9 +111,3 @@ def test_windows_of_a_run_begin_again_after_the_last():
     values = coarse_run(100).parts[0].values
     drawn = Runs(coarse_run(100), 80).draw(np.array([0, 20, 21, 43]), [None] * 4, np.random.default_rng(0))
     np.testing.assert_array_equal(drawn.coarse, [values[:80], values[20:], values[:80], values[1:81]])
-
-
-def test_waveforms_have_every_phase_of_a_window(refused):
-    simulator = SquareWaveSimulator([SquareWave(40.0)])
-    with refused("(400, 80)", "(399, 80)"):
-        Waves([simulator], ("a",), 1.0, 80, [np.zeros((399, 80))])

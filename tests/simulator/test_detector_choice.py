@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.simulator.detector_choice import RELATIONS, JudgedDetector, choose_detector, relation_anomalies
+from enhsim_tf.simulator.detector_choice import RELATIONS, JudgedDetector, anomalous_windows, choose_detector, relation_anomalies
 
 
 def detector(name, false_alarms=0.01, recall=0.5, relation=None):
@@ -39,3 +39,10 @@ def test_a_lost_relation_of_two_channels_is_found_by_the_innovation(both):
     judged = {each["name"]: each for each in both[1].detectors}
     assert judged["innovation"]["by_kind"]["another time"] > 0.9 > judged["largest step"]["by_kind"]["another time"] + 0.5
     assert all(each["false_alarms"] <= 0.05 for each in both[1].detectors)
+
+
+def test_anomalies_are_in_one_channel_and_of_the_asked_size():
+    nominal = np.zeros((6, 120, 2), np.float32)
+    found = anomalous_windows(nominal, np.array([1.0, 10.0]), 0, (4.0,))["level_shift", 4.0]
+    size = np.abs(found).max(axis=1)
+    assert ((size > 0).sum(axis=1) == 1).all() and set(size[size > 0].tolist()) == {4.0, 40.0}

@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.simulator import figures
-from enhsim_tf.simulator.figures import report_figure, score_figure
+from enhsim_tf.simulator.figures import inject_figure, report_figure, score_figure
 from enhsim_tf.simulator.report import correlation_of
 from enhsim_tf.simulator.scoring import score
+from enhsim_tf.telemetry.placing import PlacedEvent
 from tests.simulator.conftest import joint
 
 
@@ -65,3 +66,15 @@ def test_a_figure_of_scores_breaks_at_gaps_and_shows_the_channels_that_depart_mo
     np.testing.assert_array_equal(sheet.axes[0].lines[0].get_ydata(), drawn)
     said = " ".join(text.get_text() for text in sheet.texts)
     assert "1 event, 50.0% of scored samples flagged" in said and "the 3 of 4 channels" in said
+
+
+def test_a_figure_of_anomalies_shades_and_names_them_in_the_channels_that_they_change():
+    frame = pd.DataFrame(np.ones((6, 3)), [0, 1, 2, 10, 11, 12], ["a", "b", "c"]).assign(mask=True)
+    frame.attrs = {"counts": False, "anomalies": [PlacedEvent("delay", 1, 0, 1, "a"), PlacedEvent("another_time", 1, 2, 1, "c")]}
+    sheet = inject_figure(frame, ["a", "b", "c"])
+    drawn = [(axes.get_ylabel(), *((each.get_x(), each.get_width()) for each in axes.patches)) for axes in sheet.axes]
+    assert drawn == [("a", (0, 1)), ("c", (2, 1))]  # not up to 10, which comes after the gap
+    assert [[each.get_text() for each in axes.texts] for axes in sheet.axes] == [["delay"], ["another_time"]]
+    frame.attrs["anomalies"] = [PlacedEvent("common_shift", 4, each % 6, 1) for each in range(21)]
+    sheet = inject_figure(frame, ["a", "b", "c"])
+    assert [len(axes.patches) for axes in sheet.axes] == [21] * 3 and not any(axes.texts for axes in sheet.axes)

@@ -22,7 +22,7 @@ SMALL |= {"robustness__num_windows": 60, "robustness__num_seeds": 1, "modes__num
 JUDGED, MODELS = 2 * len(replicate.ARMS) + len(CONTROLS), len(cells.MODELS)  # controls on real windows only
 ROWS = {
     "robustness": {"alarms": 10 * JUDGED, "recall": 8 * 5 * JUDGED, "degraded": len(METHODS) * (1 + len(MODES) * len(SEVERITIES))},
-    "noise_models": {"detectors": 2 * (1 + MODELS), "realism": len(MEASURES) * (1 + MODELS), "choice": MODELS},
+    "noise_models": {"detectors": 2 * (1 + MODELS), "realism": len(MEASURES) * (1 + MODELS)},
     "few_windows": {"rows": 2 * 5 * len(QUICK)},  # numbers of windows, kinds of training data, detectors
 }
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.datasets.inject import inject_channel
+from enhsim_tf.datasets.inject import inject
 from enhsim_tf.datasets.inject_options import InjectOptions
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
@@ -481,9 +481,6 @@ def test_packed_files_are_read(tmp_path, refused):
         archive.writestr("second.csv", PLAIN)
     with refused("inside.CSV, second.csv"):
         read_source(tmp_path / "a.zip")
-    (tmp_path / "bomb.csv.gz").write_bytes(gzip.compress(bytes(300_000_000)))
-    with refused("when unpacked"):
-        read_source(tmp_path / "bomb.csv.gz")
 
 
 def test_a_workbook_is_read_with_its_dates(tmp_path):
@@ -519,7 +516,7 @@ def test_pandas_objects_are_sources():
 @pytest.mark.parametrize("form", ["labelled.csv", "labelled.parquet", "timeeval.csv"])
 def test_the_files_of_this_tool_are_read_back(tmp_path, form):
     cleaned = clean(pd.Series(VALUES, index=TIMES, name="value"))
-    frame = inject_channel(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0))
+    frame = inject(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0))
     write_table(tmp_path / form, frame, ["value"] if form == "timeeval.csv" else ())
     series = only(read_source(tmp_path / form))
     report = check(series, frame["value"])

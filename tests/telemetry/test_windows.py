@@ -1,9 +1,9 @@
-"""Splitting and cutting series, blocks of time and disjoint windows, against cases worked out by hand."""
+"""Splitting and cutting series, and blocks of time, against cases worked out by hand."""
 
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.windows import disjoint_rows, evenly_spaced_starts, random_window_starts, time_blocks
+from enhsim_tf.telemetry.windows import evenly_spaced_starts, random_window_starts, time_blocks
 
 
 def test_blocks_of_time_by_hand():
@@ -25,13 +25,6 @@ def test_windows_that_overlap_the_held_out_block_are_left_out():
 def test_there_are_at_most_as_many_blocks_as_windows():
     assert time_blocks(np.array([5]), 5, 10) == []
     assert [held_out.tolist() for _, held_out in time_blocks(np.array([5, 0, 99]), 5, 1)] == [[1], [0], [2]]
-
-
-def test_disjoint_windows_by_hand():
-    starts = np.array([25, 0, 7, 10, 19, 20])  # windows of 10: those that begin at 0, 10 and 20 share no sample
-    assert disjoint_rows(starts, 10).tolist() == [1, 3, 5]
-    assert disjoint_rows(starts, 1).tolist() == [1, 2, 3, 4, 5, 0]
-    assert disjoint_rows(starts[:0], 10).tolist() == []
 
 
 def test_random_starts_reach_every_window_and_no_more(refused):

@@ -4,6 +4,7 @@ import collections
 import concurrent.futures
 import contextlib
 import functools
+import itertools
 import multiprocessing
 import multiprocessing.connection
 import os
@@ -55,9 +56,9 @@ def run_local(work: bytes, items: Iterator[Any], workers: int | None) -> Iterato
                         failures = 0
                         yield result
             except BrokenProcessPool:
-                retry.extend(running.values())
+                retry.extendleft(reversed(running.values()))  # before what was not submitted yet, as the pool had taken it
         failures += 1
-    raise ProcessesDiedError(retry)
+    raise ProcessesDiedError(itertools.islice(retry, num_processes))  # the others were still waiting
 
 
 def num_cpus() -> int:
@@ -72,7 +73,7 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, retry: coll
     try:
         return pool.submit(_call, item)
     except BrokenProcessPool:
-        retry.append(item)
+        retry.appendleft(item)
         raise
     finally:
         if masked:

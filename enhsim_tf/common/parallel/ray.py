@@ -15,7 +15,6 @@ from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.common.parallel.local import MAX_FAILURES, ProcessesDiedError, start_worker
 
 _ANSWER_S = 10
-_REFUSALS = (ConnectionError, RuntimeError, OSError, ValueError)
 
 
 def _call(work: bytes, item: Any) -> Any:
@@ -76,10 +75,7 @@ def _cluster() -> Iterator[Any]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # Ray warns of a server that does not answer before it raises
                 ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
-        except Exception as error:
-            # for a node that does not start in time, Ray raises a plain Exception
-            if type(error) is not Exception and not isinstance(error, (*_REFUSALS, ray.exceptions.RayError)):
-                raise
+        except Exception as error:  # noqa: BLE001  Ray raises plain exceptions, as for a node that does not start in time
             where = f"at {address}" if address else "that starts here"
             raise InputError(f"Expected a Ray cluster {where}. Received: {_last_line(error)}.") from None
         yield ray

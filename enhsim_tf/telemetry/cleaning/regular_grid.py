@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
 from enhsim_tf.telemetry.windows import runs_of
@@ -218,7 +218,7 @@ def _build_parts(
     rows, merged = _merge_groups(rows, ["part", "place"], how)
     text = f"rows that share an interval with another row, of which the {how} was taken: {{count}}"
     log.add("averaged", merged, text, rows_left_out=len(merged))
-    text = f"rows in parts of fewer than {options.min_part:,} samples ({is_short.sum():,} such parts): {{count}}"
+    text = f"rows in parts of fewer than {options.min_part:,} samples ({counted(is_short.sum(), 'such part')}): {{count}}"
     log.add("short parts", short, text, rows_left_out=len(short))
     parts, holds = [], options.fill == "hold"
     for number, inside in rows.groupby("part"):
@@ -229,7 +229,7 @@ def _build_parts(
     num_filled = int(lengths[~is_short].sum()) - len(rows)
     is_gap = (np.diff(rows["part"]) == 0) & (np.diff(rows["place"]) > 1)
     filled = "filled with the value before them," if holds else "filled by straight lines with"
-    text = f"gaps of up to {options.longest_gap} samples, {filled} {num_filled:,} samples in total: {{count}}"
+    text = f"gaps of up to {counted(options.longest_gap, 'sample')}, {filled} {counted(num_filled, 'sample')} in total: {{count}}"
     log.add("gaps filled", rows["row"].to_numpy()[:-1][is_gap], text, samples_filled=num_filled)
     return parts, len(rows)
 
@@ -240,7 +240,7 @@ def _log_breaks(rows: pd.DataFrame, interval: float, log: CleaningLog, max_fill:
     is_gap = np.round(steps) > max_fill + 1
     unit = 1.0 if log.times is None else interval / 1e9
     longest, what = steps.max(initial=0) * unit, "samples" if log.times is None else "s"
-    text = f"gaps of more than {max_fill} samples, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
+    text = f"gaps of more than {counted(max_fill, 'sample')}, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
     log.add("gaps", numbers[is_gap], text, details={"longest": float(longest)})
     log.add("clock steps", numbers[~is_gap], "jumps of the clock, at which the series is split: {count}")
 

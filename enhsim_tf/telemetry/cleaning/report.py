@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import printable, spoken
+from enhsim_tf.common.errors import counted, printable, spoken
 
 _ACTIONS = {
     "accepted": "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, own columns, series, "
@@ -111,10 +111,9 @@ class Report:
     @property
     def summary(self) -> str:
         """The counts of rows and samples."""
-        parts = "1 part" if self.num_parts == 1 else f"{self.num_parts} parts"
         filled = f", {self.samples_filled:,} of them filled in" if self.samples_filled else ""
-        rows = f"{self.rows_in:,} rows, {self.rows_used:,} used, {self.rows_left_out:,} left out"
-        return f"{rows}; {self.samples:,} samples in {parts}{filled}"
+        rows = f"{counted(self.rows_in, 'row')}, {self.rows_used:,} used, {self.rows_left_out:,} left out"
+        return f"{rows}; {counted(self.samples, 'sample')} in {counted(self.num_parts, 'part')}{filled}"
 
     def lines(self) -> list[str]:
         """The report as text: a summary, then one line for each finding."""

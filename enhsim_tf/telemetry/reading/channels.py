@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import MAX_COLUMNS
+from enhsim_tf.common.read_errors import MAX_COLUMNS
 from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_text
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places

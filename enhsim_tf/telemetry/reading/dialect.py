@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import MAX_COLUMNS
 from enhsim_tf.telemetry.cleaning.report import Finding
 
 BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
@@ -75,8 +74,8 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         found += [single] if single else []
     with_header = [each for each in found if any(each.names)]
     best = max(with_header or found, key=lambda each: len(each.names) if with_header else 0, default=None)
-    if best is None or len(best.names) > MAX_COLUMNS:
-        raise ValueError("lines of different lengths" if best is None else f"more than {MAX_COLUMNS:,} columns")
+    if best is None:
+        raise ValueError("lines of different lengths")
     if not with_header and not no_header:
         best = _named_by_comment(best, lines)
         if best is None:

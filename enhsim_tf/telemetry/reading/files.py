@@ -12,7 +12,7 @@ import pandas as pd
 import pyarrow as pa
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import MAX_COLUMNS, READ_ERRORS, check_parquet, short_reason
+from enhsim_tf.common.read_errors import MAX_COLUMNS, READ_ERRORS, short_reason
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.reading.dialect import find_dialect
@@ -21,7 +21,6 @@ from enhsim_tf.telemetry.registry import PACKED, SOURCES
 
 TEXTS = (".csv", ".tsv", ".txt")
 _EXCEL = (".xlsx", ".xlsm")
-_SMALL_BYTES, _MAX_RATIO = 2**28, 200  # an unpacked file may have this size, or this many times its packed size
 
 
 def read_table(source: Path | Sequence[Path] | pd.DataFrame | pd.Series, options: Cleaning) -> Table:
@@ -56,7 +55,6 @@ def _read_file(path: Path, options: Cleaning) -> Table:
         if suffix == ".parquet":
             if content is not None:
                 raise ValueError("a packed Parquet file; unpack it")
-            check_parquet(path)
             return Table(pd.read_parquet(path))
         content = path.read_bytes() if content is None else content
         return _read_excel(io.BytesIO(content), path.name, options) if suffix in _EXCEL else read_text(content, path.name, options)
@@ -70,23 +68,18 @@ def _read_file(path: Path, options: Cleaning) -> Table:
 
 def _unpack(path: Path) -> tuple[bytes | None, str]:
     """Returns the content of a packed file, or None if it is not packed, and the name of the file inside."""
-    suffix, size = path.suffix.lower(), path.stat().st_size
-    limit = max(_SMALL_BYTES, _MAX_RATIO * size)
+    suffix = path.suffix.lower()
     if suffix == ".gz":
-        with gzip.open(path) as file:
-            content, name = file.read(limit + 1), path.stem if Path(path.stem).suffix else f"{path.stem}.csv"
+        content, name = gzip.decompress(path.read_bytes()), path.stem if Path(path.stem).suffix else f"{path.stem}.csv"
     elif suffix == ".zip":
         with zipfile.ZipFile(path) as archive:
             members = [member for member in archive.infolist() if not member.is_dir() and not member.filename.startswith("__MACOSX/")]
             if len(members) != 1:
                 said = ", ".join(member.filename for member in members[:4]) or "none"
                 raise InputError(f"Expected one file in {path.name}. Received: {len(members)} ({said}). Unpack it and give the files.")
-            with archive.open(members[0]) as file:
-                content, name = file.read(limit + 1), members[0].filename
+            content, name = archive.read(members[0]), members[0].filename
     else:
         return None, path.name
-    if len(content) > limit:
-        raise ValueError(f"more than {limit:,} bytes when unpacked; unpack it")
     if Path(name).suffix.lower() not in (*TEXTS, *_EXCEL, ".parquet"):
         raise ValueError(f"{name} inside, which is no table")
     return content, name
@@ -98,13 +91,7 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
         import openpyxl
     except ImportError:
         raise InputError(f"Expected the package openpyxl for {name}. Received: none. Install it, or save the sheet as CSV.") from None
-    findings = []
-    with zipfile.ZipFile(stream) as archive:
-        limit = max(_SMALL_BYTES, _MAX_RATIO * stream.getbuffer().nbytes)
-        if sum(member.file_size for member in archive.infolist()) > limit:
-            raise ValueError(f"more than {limit:,} bytes when unpacked; save the sheet as CSV")
-    stream.seek(0)
-    book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
+    findings, book = [], openpyxl.load_workbook(stream, read_only=True, data_only=True)
     rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]
     if len(book.worksheets) > 1:
         findings.append(Finding("files", 1, f"only the first sheet was read: {book.worksheets[0].title}"))

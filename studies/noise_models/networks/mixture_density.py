@@ -21,7 +21,7 @@ from scipy.special import gammaln
 
 from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 from studies.common.training import seeded_initialiser
 
@@ -78,7 +78,7 @@ class MixtureDensityNoise:
             noise = noise + self._levels.step * (rng.random(noise.shape) - 0.5)
         self._signal_scale = None if signal is None else (float(np.mean(signal)), float(np.std(signal)) or 1.0)
         values, below = (noise / self.scale).astype(np.float32), self._standardised(signal)
-        self._pasts = self._real_pasts(values, below, starts)
+        self._pasts = self._real_pasts(values, below)
         learnt, held_out = _split(self.window * np.arange(len(noise)) if starts is None else np.asarray(starts), self.window)
         judged = self._examples(values, below, held_out, _NUM_JUDGED, rng)
         self.network = _build(*self._examples(values, below, learnt, _NUM_LINEAR, rng), self._num_linear, self._num_far, self.seed)
@@ -137,14 +137,10 @@ class MixtureDensityNoise:
         mean, deviation = self._signal_scale
         return ((np.asarray(signal, np.float64) - mean) / deviation).astype(np.float32)
 
-    def _real_pasts(
-        self, values: np.ndarray, below: np.ndarray | None, starts: np.ndarray | None
-    ) -> WindowBootstrap | MatchedWindowBootstrap:
+    def _real_pasts(self, values: np.ndarray, below: np.ndarray | None) -> WindowBootstrap:
         """Draws first halves of windows, whose signal in the second half is similar to that of a generated window in the first."""
         first = values[:, : self._past]
-        if below is None:
-            return WindowBootstrap(first, starts)
-        return MatchedWindowBootstrap.fit(first, below[:, self._past : 2 * self._past], starts)
+        return WindowBootstrap(first) if below is None else WindowBootstrap.fit(first, below[:, self._past : 2 * self._past])
 
     def _examples(
         self, values: np.ndarray, below: np.ndarray | None, rows: np.ndarray, number: int, rng: np.random.Generator

@@ -1,10 +1,25 @@
-"""Classical noise models that are fitted to extracted noise: the baselines for the paper's GAN (section 2.3)."""
+"""Gaussian noise models that are fitted to extracted noise: baselines for the paper's GAN and for residual windows (section 2.3)."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.noise.names import MATCHED, NONE, RESIDUAL_WINDOWS
+from enhsim_tf.noise.window_bootstrap import NoiseModel, fit_noise
+
+CANDIDATES = (NONE, "gaussian", "autoregression", RESIDUAL_WINDOWS, MATCHED)
+"""The noise models that need no training, the simplest first."""
+_MOST_ORDER = 200  # of the autoregression
+
+
+def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> NoiseModel:
+    """Fits one of `CANDIDATES` to windows of noise and the enhanced signal below them, both of shape `(windows, samples, channels)`."""
+    if name == "gaussian":
+        return GaussianNoise.fit(noise)
+    if name == "autoregression":
+        return GaussianNoise.fit_autoregressions(noise, min(_MOST_ORDER, noise.shape[1] - 1))
+    return fit_noise(name, noise, signal)
 
 
 class GaussianNoise:

@@ -1,11 +1,11 @@
-"""The classical noise models, compared with closed forms."""
+"""The Gaussian noise models, compared with closed forms."""
 
 import numpy as np
 import pytest
 from numpy.random import default_rng
 from scipy.signal import lfilter
 
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
+from studies.common.gaussian_noise import GaussianAutoregression, GaussianNoise
 
 
 def test_gaussian_noise_of_several_channels_keeps_their_covariance():

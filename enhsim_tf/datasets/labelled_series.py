@@ -1,43 +1,16 @@
-"""Labelled training data: windows, or one continuous series, with labels that mark exactly the samples that a scenario has changed."""
+"""One continuous labelled series, with labels that mark exactly the samples that a scenario has changed."""
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.common.atomic_files import make_folder, replace_file
-from enhsim_tf.datasets.label_columns import parquet_options, series_table, window_schema, window_table
-from enhsim_tf.datasets.places import Share, parse_start
+from enhsim_tf.datasets.label_columns import series_table
+from enhsim_tf.datasets.places import ScenarioRange, draw_between, parse_start
 from enhsim_tf.simulator.changes import fade_length
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.placing import PlacedEvent, in_order, place_events
-
-
-def write_windows_labelled(path: str | os.PathLike, simulator: EnhancedSimulator, shares: Sequence[Share]) -> dict[Degraded, int]:
-    """Writes labelled windows to one Parquet file, chunk by chunk. The file appears only when it is complete.
-
-    A window that its scenario has not changed, such as one in which the mechanism would have stood still anyway, is labelled nominal.
-
-    Returns:
-        For each scenario, the number of its windows that are labelled nominal because it has changed no sample of them.
-    """
-    channels, unchanged = simulator.channels, {}
-    about = {"interval_s": repr(simulator.interval_s), "channel": ", ".join(channels)}
-    schema = window_schema(simulator.window, channels).with_metadata(about)
-    make_folder(Path(path).parent)
-    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **parquet_options(schema)) as writer:
-        for share in shares:
-            scenario = share.scenario
-            name, severity = (scenario.mode, scenario.severity) if scenario else ("", 0.0)
-            for windows, masks in simulator.generate_labelled_chunks(share.num_windows, scenario, share.seed):
-                writer.write_table(window_table(windows, masks, channels, [name] * len(windows), [severity] * len(windows)))
-                if scenario:
-                    unchanged[scenario] = unchanged.get(scenario, 0) + int(np.count_nonzero(~masks.any(axis=(1, 2))))
-    return unchanged
 
 
 def series_index(num_samples: int, interval_s: float, start: str | pd.Timestamp | None = None) -> pd.Index:
@@ -85,7 +58,7 @@ def draw_schedule(
     simulator: EnhancedSimulator,
     num_samples: int,
     given: Sequence[PlacedEvent],
-    modes: Sequence[Degraded],
+    modes: Sequence[ScenarioRange],
     number: int,
     lengths: tuple[int, int],
     rng: np.random.Generator,
@@ -99,7 +72,7 @@ def draw_schedule(
         simulator: The simulator, whose series begins at time 0.
         num_samples: Length of the series.
         given: Events at given places.
-        modes: Modes and severities of the drawn events; their onset is not used.
+        modes: Modes and severities of the drawn events, each of which draws its own severity; their onset is not used.
         number: Number of events at drawn places.
         lengths: Least and greatest length of a drawn event in samples.
         rng: Random number generator.
@@ -108,11 +81,12 @@ def draw_schedule(
         simulator.alignment.draw(np.zeros(0, int), [*modes, *given], rng)  # refuses them
     given = in_order(given, [(0, num_samples)], gap=1)
     gap = max(2 * fade_length(simulator.window) + 1, lengths[1])  # changes that fade do not meet
-    drawn = [(modes[each % len(modes)], int(rng.integers(lengths[0], lengths[1] + 1))) for each in range(number)]
+    turns = [(modes[each % len(modes)], int(rng.integers(lengths[0], lengths[1] + 1))) for each in range(number)]
+    drawn = [(mode.mode, draw_between(mode.severity, rng), length) for mode, length in turns]
 
     def changes(event: PlacedEvent) -> bool:
         times, scenario = simulator.interval_s * np.arange(event.begin, event.end)[None], Degraded(event.kind, event.severity, 0.0)
         waves = simulator.alignment.simulators
         return any((each.simulate(times, scenario, np.random.default_rng(0)) != each.simulate(times)).any() for each in waves)
 
-    return place_events(given, [(mode.mode, mode.severity, length) for mode, length in drawn], [(0, num_samples)], gap, changes, rng)
+    return place_events(given, drawn, [(0, num_samples)], gap, changes, rng)
