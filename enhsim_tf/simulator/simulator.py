@@ -16,7 +16,7 @@ from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.read_errors import READ_ERRORS, short_reason
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
-from enhsim_tf.noise.window_bootstrap import NoiseModel
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
 from enhsim_tf.simulator.joint import cut, rounded, windows_of
@@ -58,7 +58,7 @@ class EnhancedSimulator:
         self,
         alignment: Alignment,
         enhancer: Enhancer,
-        noise: NoiseModel,
+        noise: WindowBootstrap,
         channels: Sequence[str] = ("telemetry",),
         interval_s: float = 1.0,
         levels: np.ndarray | None = None,
