@@ -15,7 +15,7 @@ from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, choose_enhancer, fit_enhancer, split_fold
+from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, Training, choose_enhancer, split_fold
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
 from enhsim_tf.noise.names import MATCHED, RESIDUAL_WINDOWS
@@ -205,7 +205,7 @@ def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tu
             waveforms.append(None)
             if not simulator.is_constant:
                 some = np.flatnonzero(kept)[:_NUM_WAVEFORM]
-                ridge = fit_enhancer(RIDGE, coarse[some][:, :, [channel]], wanted[some][:, :, [channel]], times[some])
+                ridge = Training(coarse[some][:, :, [channel]], wanted[some][:, :, [channel]], times[some]).fit(RIDGE)
                 waveforms[-1] = ridge.predict(waves.phases(channel)[:, :, None])[:, :, 0]
         waves = Waves(waves.simulators, waves.channels, waves.interval_s, waves.window, waveforms)
 
@@ -305,8 +305,8 @@ def _held_out_residuals(
         enhancer: Enhancer = choice.without_fold
         if fold:
             kept, _ = split_fold(times, window, choice.edges, fold)
-            windows = inputs[kept], targets[kept], times[kept]
-            enhancer = fit_enhancer(enhancer.name, *windows, options.seed, options.epochs, choice.penalties)
+            training = Training(inputs[kept], targets[kept], times[kept], choice.penalties)
+            enhancer = training.fit(enhancer.name, options.seed, options.epochs)
         other = EnhancedSimulator(simulator.alignment, enhancer, None, simulator.channels, simulator.interval_s)
         for block in range(fold, len(choice.edges) - 1, NUM_FOLDS):
             for part, coarse in zip(learnt.parts, run.parts, strict=True):

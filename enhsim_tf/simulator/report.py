@@ -8,7 +8,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import printable, spoken
-from enhsim_tf.enhancer.candidates import Choice, fit_enhancer
+from enhsim_tf.enhancer.candidates import Choice, Training
 from enhsim_tf.enhancer.names import COARSE
 from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
 from enhsim_tf.simulator.joint import nrmse, windows_of
@@ -126,7 +126,7 @@ def make_report(
     real, clean = simulator.windows_and_signal(judged, run, _NUM_WINDOWS)
     plain, outside = _coarse_signal(simulator, real, run)
     noise = real - clean
-    generated = simulator.draw_noise(simulator.generate_clean(len(real), seed=seed), np.random.default_rng([seed, 5]))
+    generated = simulator.draw_noise(simulator.generate(len(real), seed=seed, with_noise=False), np.random.default_rng([seed, 5]))
     errors = {"coarse": nrmse(plain, real), "enhanced": nrmse(clean, real)}
     shown = int(np.argsort(np.mean(noise**2, axis=(1, 2)))[len(noise) // 2])
     trained = simulator.trained
@@ -160,7 +160,7 @@ def _coarse_signal(simulator: EnhancedSimulator, real: np.ndarray, run: Recordin
     trusted, starts = TrustedRange(simulator), evenly_spaced_starts(run.parts, simulator.window, _NUM_WINDOWS)
     coarse = windows_of(run, starts, simulator.window)
     outside = np.concatenate([trusted.score_run(part.values) for part in run.parts]) > 1
-    return fit_enhancer(COARSE, coarse, real, np.arange(len(real))).predict(coarse), float(outside.mean())
+    return Training(coarse, real, np.arange(len(real))).fit(COARSE).predict(coarse), float(outside.mean())
 
 
 def correlation_of(windows: np.ndarray) -> np.ndarray:
