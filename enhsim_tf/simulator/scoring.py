@@ -64,10 +64,9 @@ class Scorer:
         # of the generated series, in windows
         self._length = int(np.clip(_SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS))
         seed = self.options.seed
+        training = simulator.generate(self.options.num_windows, seed=seed, with_noise=not simulator.is_run_model)
         if simulator.is_run_model:
-            training = simulator.draw_noise(simulator.generate_clean(self.options.num_windows, seed=seed), np.random.default_rng([seed, 3]))
-        else:
-            training = simulator.generate(self.options.num_windows, seed=seed)
+            training = simulator.draw_noise(training, np.random.default_rng([seed, 3]))
         self.detector = ResidualSize() if self.name == RESIDUAL else DETECTORS[self.name](seed)
         means = training.mean(axis=1, dtype=np.float64)
         width = np.maximum(np.ptp(means, axis=0), simulator.noise_sd)

@@ -92,12 +92,12 @@ class EnhancedSimulator:
     @functools.cached_property
     def noise_sd(self) -> np.ndarray:
         """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
-        return np.std(self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0)), axis=(0, 1), dtype=np.float64)
+        return np.std(self.draw_noise(self.generate(_NUM_NOISE, with_noise=False), np.random.default_rng(0)), axis=(0, 1), dtype=np.float64)
 
     @functools.cached_property
     def scale(self) -> np.ndarray:
         """Standard deviation of the generated telemetry of each channel, shape `(channels,)`; 1 for a constant one."""
-        deviation = np.hypot(np.std(self.generate_clean(_NUM_NOISE), axis=(0, 1), dtype=np.float64), self.noise_sd)
+        deviation = np.hypot(np.std(self.generate(_NUM_NOISE, with_noise=False), axis=(0, 1), dtype=np.float64), self.noise_sd)
         return np.where(deviation > 0, deviation, 1.0)
 
     # enhancement
@@ -166,19 +166,16 @@ class EnhancedSimulator:
         draw = self.noise.generate if np.ndim(clean) == 3 else self.noise.generate_series
         return check_finite(draw(len(clean), rng, clean))
 
-    def add_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Adds noise to an enhanced signal and rounds quantised channels to their levels."""
-        return rounded(clean + self.draw_noise(clean, rng), self.quantisation)
-
     # windows
 
-    def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+    def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0, with_noise: bool = True) -> np.ndarray:
         """Generates realistic telemetry windows: enhanced signal plus generated noise ("Combined").
 
         Args:
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
             seed: Random seed of start times, scenario and noise. The same seed gives the same windows.
+            with_noise: Whether noise is added to the enhanced signal.
 
         Returns:
             float32 array of shape `(num_windows, samples, channels)`, in the telemetry's unit.
@@ -186,11 +183,12 @@ class EnhancedSimulator:
         Raises:
             InputError: If `num_windows` is negative or not a whole number, or a scenario cannot be applied.
         """
-        return self._joined(num_windows, scenario, seed)
-
-    def generate_clean(self, num_windows: int, seed: int = 0) -> np.ndarray:
-        """Returns the nominal windows of `generate` before noise is added."""
-        return self._joined(num_windows, None, seed, with_noise=False)
+        _check_count("num_windows", num_windows, 0)
+        windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
+        for chunk, _ in self.generate_labelled_chunks([scenario] * num_windows, seed, with_noise):
+            windows[filled : filled + len(chunk)] = chunk
+            filled += len(chunk)
+        return windows
 
     def generate_labelled_chunks(
         self, scenarios: Sequence[Degraded | None], seed: int = 0, with_noise: bool = True
@@ -209,14 +207,6 @@ class EnhancedSimulator:
             drawn = self.alignment.draw(starts[some], scenarios[some], rng)
             degraded = [row for row, scenario in enumerate(scenarios[some]) if scenario is not None]
             yield self._complete(drawn, degraded, None if self.levels is None else self.levels[rows[some]], noise_rng)
-
-    def _joined(self, num_windows: int, scenario: Degraded | None, seed: int, with_noise: bool = True) -> np.ndarray:
-        _check_count("num_windows", num_windows, 0)
-        windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
-        for chunk, _ in self.generate_labelled_chunks([scenario] * num_windows, seed, with_noise):
-            windows[filled : filled + len(chunk)] = chunk
-            filled += len(chunk)
-        return windows
 
     def _complete(
         self, drawn: Drawn, degraded: list[int], levels: np.ndarray | None, noise_rng: np.random.Generator | None
@@ -287,7 +277,7 @@ class EnhancedSimulator:
         if self.is_run_model:
             self.alignment.draw(np.zeros(0, int), [scenario, *schedule], noise_rng)  # refuses them
             clean = self.nominal_series(num_samples)
-            return self.add_noise(clean, noise_rng), np.zeros(clean.shape, bool), []
+            return *self._with_noise(clean, clean, np.zeros(clean.shape, bool), noise_rng), []
         events = [(Degraded(each.kind, each.severity, 0.0), each.begin, each.end) for each in schedule]
         events += [] if scenario is None else [(scenario, 0, num_samples)]
         window, hop = self.window, self.window // 2
@@ -347,7 +337,7 @@ class EnhancedSimulator:
         clean = [self.enhance_run(part.values) for part in self.recorded_runs().usable(run).parts]
         for number in range(num_copies):
             rng = np.random.default_rng([seed, 1, number])
-            yield [self.add_noise(enhanced, rng) for enhanced in clean]
+            yield [rounded(enhanced + self.draw_noise(enhanced, rng), self.quantisation) for enhanced in clean]
 
     def recorded_runs(self) -> Runs:
         """Returns the alignment of a simulator of recorded runs; raises InputError if it is one of square waves."""

@@ -22,7 +22,7 @@ def test_the_waveform_below_the_noise_is_recovered(single):
 
 def test_each_channel_keeps_its_phase_level_and_scale(both):
     simulator, report = both
-    clean = simulator.generate_clean(400, seed=0)
+    clean = simulator.generate(400, seed=0, with_noise=False)
     assert clean.mean(axis=(0, 1)) == pytest.approx([5, 100], rel=0.02)
     assert np.std(clean, axis=(0, 1)) == pytest.approx(np.std(smooth_wave(4_000)) * np.array([2, 30]), rel=0.05)
     real = np.corrcoef(smooth_wave(4_000), -smooth_wave(4_000, 0.25))[0, 1]
