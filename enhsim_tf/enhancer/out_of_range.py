@@ -18,12 +18,7 @@ class OutOfRange:
 
     where `unit` is the standard deviation of the training windows. Of four candidates, this form ranks degraded modes and waves in unseen
     phases best by the true error of the paper's enhancer: the residual alone is blind to unseen phases, and the distance alone gives full
-    weight to shifts that the enhancer follows well. `detection.metrics.threshold` of held-out nominal windows is a limit.
-
-    Example:
-    >>> out_of_range = OutOfRange().fit(coarse_training_windows)
-    >>> limit = metrics.threshold(out_of_range.score(coarse_held_out_windows), rate=0.01)
-    >>> trusted = out_of_range.score(coarse_degraded_windows) <= limit
+    weight to shifts that the enhancer follows well. A limit is `detection.metrics.threshold` of held-out nominal windows.
     """
 
     def fit(self, coarse_windows: np.ndarray) -> "OutOfRange":

@@ -19,7 +19,7 @@ from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.detection import metrics
-from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_square
+from enhsim_tf.detection.detectors import JointSize, following_drift, root_mean_square
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL
 from enhsim_tf.enhancer.model import run_starts
@@ -67,15 +67,14 @@ class Scorer:
         training = simulator.generate(self.options.num_windows, seed=seed, with_noise=not simulator.is_run_model)
         if simulator.is_run_model:
             training = simulator.draw_noise(training, np.random.default_rng([seed, 3]))
-        self.detector = ResidualSize() if self.name == RESIDUAL else DETECTORS[self.name](seed)
         means = training.mean(axis=1, dtype=np.float64)
         width = np.maximum(np.ptp(means, axis=0), simulator.noise_sd)
         self._low, self._high = means.min(axis=0) - width, means.max(axis=0) + width  # levels beyond count as residual
         if self.name == RESIDUAL:
             self._joint = None if len(simulator.channels) == 1 else JointSize().fit(self._judged(training))
-            self.detector.fit_sizes(self._sizes(training))
+            self.typical_size = float(np.median(self._sizes(training)))
         else:
-            self.detector.fit(self._judged(training))
+            self.detector = DETECTORS[self.name](seed).fit(self._judged(training))
         generated, self.rate = metrics.finite_threshold(self._of_generated(seed + 1), self.options.false_alarm_rate, self._length)
         self.nominal_threshold = -np.inf
         for real in self._of_nominal():
@@ -128,7 +127,7 @@ class Scorer:
         chunks = (begins[first : first + step] for first in range(0, len(begins), step))
         scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
         if self.name == RESIDUAL:  # its scale follows the windows before, so it sees all sizes at once
-            scores = self.detector.score_sizes(scores)
+            scores = following_drift(scores, self.typical_size)
         return mean_over_windows(scores, begins, self.window, len(series))
 
     def _sizes(self, windows: np.ndarray) -> np.ndarray:
