@@ -156,13 +156,11 @@ class Waves:
         simulator, length = self.simulators[channel], int(starts.max(initial=0)) + self.window
         if length > len(self._series[channel]):
             if 2 * len(starts) * self.window < length:
-                return self._in_unit(channel, simulator.simulate(self._times(starts)))[:, :, None]
+                each = self.interval_s * (starts[:, None] + np.arange(self.window))
+                return self._in_unit(channel, simulator.simulate(each))[:, :, None]
             times = self.interval_s * np.arange(1 << length.bit_length())  # the next windows are hardly ever beyond its end
             self._series[channel] = self._in_unit(channel, simulator.simulate(times[None]))[0][:, None]
         return cut(self._series[channel : channel + 1], starts, self.window)
-
-    def _times(self, starts: np.ndarray) -> np.ndarray:
-        return self.interval_s * (starts[:, None] + np.arange(self.window))
 
     def _concerned(self, scenario: Degraded) -> Sequence[int]:
         if scenario.channel is None:

@@ -66,17 +66,15 @@ class Report:
 
     def warnings(self) -> list[str]:
         """Returns what should keep a reader from trusting the simulator, the first of `lines`."""
-        found = []
+        (used,), found = [each for each in self.detectors if each["name"] == self.detector], []
         if not self.keeps_promise:
-            (alarms,) = [each["false_alarms"] for each in self.detectors if each["name"] == self.detector]
             found.append(
-                f"WARNING: no detector keeps its promise; the best, {self.detector}, flags {alarms:.0%} of nominal telemetry at {RATE:.0%} set. "
+                f"WARNING: no detector keeps its promise; the best, {self.detector}, flags {used['false_alarms']:.0%} of nominal telemetry at {RATE:.0%} set. "
                 "Do not trust its alarms"
             )
-        (recall,) = [each["recall"] for each in self.detectors if each["name"] == self.detector]
-        if recall < _LEAST_RECALL:
+        if used["recall"] < _LEAST_RECALL:
             found.append(
-                f"WARNING: {self.detector}, the detector that score uses, finds only {recall:.0%} of the injected anomalies, so a fault can go unseen. "
+                f"WARNING: {self.detector}, the detector that score uses, finds only {used['recall']:.0%} of the injected anomalies, so a fault can go unseen. "
                 "Compare the line of the detectors; another --window, or --detector of score, may find more"
             )
         return found
@@ -165,11 +163,8 @@ def _coarse_signal(simulator: EnhancedSimulator, real: np.ndarray, run: Recordin
 
 def correlation_of(windows: np.ndarray) -> np.ndarray:
     """Returns the correlation of the channels of windows of noise, shape `(channels, channels)`, 0 for a constant channel."""
-    rows = np.asarray(windows, np.float64).reshape(-1, windows.shape[2])
-    covariance = np.cov(rows, rowvar=False).reshape(rows.shape[1], -1)
-    size = np.sqrt(np.diag(covariance))
-    size = np.where(size > 0, size, 1.0)
-    return covariance / size[:, None] / size
+    with np.errstate(invalid="ignore"):
+        return np.nan_to_num(np.corrcoef(windows.reshape(-1, windows.shape[2]), rowvar=False, dtype=np.float64))
 
 
 def _cross_correlation(channels: Sequence[str], real: np.ndarray, generated: np.ndarray) -> dict[str, Any]:

@@ -38,8 +38,6 @@ _CHUNK_VALUES = 4_000_000  # values of windows that are scored at a time
 _NOMINAL_VALUES = 2_000_000  # most values of nominal telemetry with which a threshold is set
 LEARNT, NEW = "learnt", "new operating point"
 """What an event departs from."""
-DEFAULT = "PCA residual"
-"""The detector of a simulator whose fit chose none."""
 
 
 class Scorer:
@@ -57,7 +55,7 @@ class Scorer:
     def __init__(self, simulator: EnhancedSimulator, options: ScoreOptions | None = None):
         self.simulator, self.options = simulator, options or ScoreOptions()
         self.window = simulator.window
-        self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", DEFAULT))).detector
+        self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", "PCA residual"))).detector
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)

@@ -205,29 +205,15 @@ class EnhancedSimulator:
         for first in range(0, num_windows, chunk):
             some = slice(first, first + chunk)
             drawn = self.alignment.draw(starts[some], scenarios[some], rng)
+            levels = () if self.levels is None else np.moveaxis(self.levels[rows[some]], 2, 0)  # offset and gain of each window and channel
+            clean = windows = self.enhance(drawn.nominal, *levels)
+            mask = np.zeros(clean.shape, bool)
             degraded = [row for row, scenario in enumerate(scenarios[some]) if scenario is not None]
-            yield self._complete(drawn, degraded, None if self.levels is None else self.levels[rows[some]], noise_rng)
-
-    def _complete(
-        self, drawn: Drawn, degraded: list[int], levels: np.ndarray | None, noise_rng: np.random.Generator | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Completes coarse windows to telemetry; returns float32 windows, and a mask of the samples that a degraded mode has changed.
-
-        `degraded` are the numbers of the windows with a degraded mode; the others are enhanced once. `levels` are offset and gain of each
-        window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the nominal signal, so samples that are
-        not marked equal the nominal ones to the bit.
-        """
-
-        def enhanced(coarse: np.ndarray, rows: slice | list[int]) -> np.ndarray:
-            return self.enhance(coarse[rows], *(() if levels is None else (levels[rows, :, 0], levels[rows, :, 1])))
-
-        clean = windows = enhanced(drawn.nominal, slice(None))
-        mask = np.zeros(clean.shape, bool)
-        if degraded:
-            windows, some = clean.copy(), Drawn(*(None if each is None else each[degraded] for each in drawn))
-            changed, fade = enhanced(drawn.coarse, degraded), fade_length(self.window)
-            windows[degraded], mask[degraded] = put_changes(clean[degraded], changed, some, [(0, self.window)], fade, self._tolerance)
-        return (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
+            if degraded:
+                windows, own = clean.copy(), Drawn(*(None if each is None else each[degraded] for each in drawn))
+                changed, fade = self.enhance(own.coarse, *(each[degraded] for each in levels)), fade_length(self.window)
+                windows[degraded], mask[degraded] = put_changes(clean[degraded], changed, own, [(0, self.window)], fade, self._tolerance)
+            yield (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
 
     @property
     def _tolerance(self) -> np.ndarray:
@@ -237,7 +223,7 @@ class EnhancedSimulator:
     def _with_noise(
         self, windows: np.ndarray, clean: np.ndarray, mask: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Adds noise that follows the nominal signal; where rounding removes a change, it is not marked."""
+        """Adds noise that follows the nominal signal, so that other samples equal the nominal ones; where rounding removes a change, it is not marked."""
         noise = self.draw_noise(clean, rng)
         values = rounded(check_finite(windows + noise), self.quantisation)
         if mask.any():
