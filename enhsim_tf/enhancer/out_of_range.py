@@ -36,16 +36,14 @@ class OutOfRange:
 
     def score(self, coarse_windows: np.ndarray) -> np.ndarray:
         """Scores coarse windows of shape `(windows, samples)`, float64 of shape `(windows,)`: close to 0 within the training range."""
-        windows = np.asarray(coarse_windows, np.float64)
-        with threadpool_limits(1):
-            chunks = [self._score(windows[begin : begin + _CHUNK]) for begin in range(0, len(windows), _CHUNK)]
-        return np.concatenate([np.zeros(0), *chunks])
-
-    def _score(self, windows: np.ndarray) -> np.ndarray:
         from scipy.spatial.distance import cdist
 
-        centred = windows - self._mean
-        coordinates = centred @ self._components.T
-        left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
-        nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
-        return np.sqrt((left + _WEIGHT * nearest) / windows.shape[1]) / self._unit
+        scores = np.empty(len(coarse_windows))
+        for begin in range(0, len(scores), _CHUNK):
+            centred = np.asarray(coarse_windows[begin : begin + _CHUNK], np.float64) - self._mean
+            with threadpool_limits(1):
+                coordinates = centred @ self._components.T
+                left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
+            nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
+            scores[begin : begin + _CHUNK] = np.sqrt((left + _WEIGHT * nearest) / centred.shape[1]) / self._unit
+        return scores
