@@ -51,11 +51,6 @@ class Waves:
         self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the coarse columns: one for each channel."""
-        return tuple(f"{simulator.columns[0]} of {name}" for simulator, name in zip(self.simulators, self.channels, strict=True))
-
-    @property
     def longest_period(self) -> float:
         """The longest period of a wave in samples; 0 if nothing is periodic."""
         return max((each.waves[0].period_s for each in self.simulators if not each.is_constant), default=0.0) / self.interval_s
