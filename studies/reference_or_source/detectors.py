@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.detection import detectors, metrics
-from studies.common.detectors import NearestNeighbours
+from studies.common.detectors import NearestNeighbours, features
 from studies.reference_or_source.windows import by_fold
 
 RATE = 0.01
@@ -88,8 +88,8 @@ def classifier(name: str, nominal: np.ndarray, faulty: np.ndarray, seed: int) ->
         from sklearn.ensemble import HistGradientBoostingClassifier
 
         with threadpool_limits(1):
-            trees = HistGradientBoostingClassifier(max_iter=60, random_state=seed).fit(detectors.features(learnt), labels)
-        return lambda windows: trees.decision_function(detectors.features(windows))
+            trees = HistGradientBoostingClassifier(max_iter=60, random_state=seed).fit(features(learnt), labels)
+        return lambda windows: trees.decision_function(features(windows))
     from sklearn.linear_model import LogisticRegression
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
