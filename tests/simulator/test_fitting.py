@@ -30,6 +30,13 @@ def test_each_channel_keeps_its_phase_level_and_scale(both):
     assert report.cross_correlation["apart"] < 0.1
 
 
+@pytest.mark.parametrize("coarse", [None, coarse_run()])
+def test_nominal_telemetry_keeps_a_piece_that_only_the_split_makes_shorter_than_a_window(coarse):
+    whole = series()
+    simulator, _ = fit([whole.part(0, 2_340), whole.part(2_340, 3_000)], coarse, QUICK)  # 2,400 samples are not held out
+    assert len(simulator.nominal) == 3_000 and (coarse is None or len(simulator.nominal_run) == 3_000)
+
+
 def test_a_delay_between_run_and_telemetry_is_recovered():
     late = series()
     late = Telemetry(late.values, late.interval_s, 70.0, late.start, late.name)  # the same values, seven samples later
