@@ -170,30 +170,19 @@ class Innovation:
         return scores
 
 
-class ResidualSize:
-    """Size of residuals, telemetry minus what a fitted simulator says that it should be, in units of a scale that follows drift.
+def following_drift(sizes: np.ndarray, typical: float, bound: float = _BOUND) -> np.ndarray:
+    """Divides sizes of residuals by a factor that follows those of past windows, because nominal ones may change as a channel ages.
 
-    The size of nominal residuals may change as a channel ages. It is therefore divided by a factor that follows the sizes of past windows, from
-    1 to `bound`, so that a residual that is more than `bound` times the threshold is an alarm for as long as it lasts.
+    The factor is the median of past sizes in units of the typical one, from 1 to `bound`. So a residual of more than `bound` times the threshold
+    is an alarm for as long as it lasts. Sizes are those of windows, evenly spaced in the order of time, shape `(windows,)`.
     """
+    import pandas as pd
 
-    def __init__(self, bound: float = _BOUND):
-        self.bound, self.typical = float(bound), np.nan
-
-    def fit_sizes(self, sizes: np.ndarray) -> "ResidualSize":
-        """Learns the typical size from those of nominal residuals, shape `(windows,)`."""
-        self.typical = float(np.median(sizes))
-        return self
-
-    def score_sizes(self, sizes: np.ndarray) -> np.ndarray:
-        """Divides sizes of windows, evenly spaced in the order of time, by the median of past sizes in units of the typical one."""
-        import pandas as pd
-
-        factors, first = np.ones(len(sizes)), _OVERLAP + _LEAST_MEMORY
-        if self.typical > 0 and len(sizes) > first:
-            past = pd.Series(sizes[: -_OVERLAP - 1]).rolling(_MEMORY, min_periods=1).median()
-            factors[first:] = past[_LEAST_MEMORY - 1 :] / self.typical
-        return sizes / np.clip(factors, 1.0, self.bound)
+    factors, first = np.ones(len(sizes)), _OVERLAP + _LEAST_MEMORY
+    if typical > 0 and len(sizes) > first:
+        past = pd.Series(sizes[: -_OVERLAP - 1]).rolling(_MEMORY, min_periods=1).median()
+        factors[first:] = past[_LEAST_MEMORY - 1 :] / typical
+    return sizes / np.clip(factors, 1.0, bound)
 
 
 def root_mean_square(windows: np.ndarray) -> np.ndarray:

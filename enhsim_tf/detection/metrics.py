@@ -49,11 +49,6 @@ def finite_threshold(scores: np.ndarray, rate: float, num_independent: int | Non
     return (float(np.max(scores)), smallest) if rate < smallest * (1 - 1e-9) else (conformal, rate)
 
 
-def false_alarm_rate(nominal_scores: np.ndarray, threshold: float) -> float:
-    """Returns the share of nominal scores above the threshold."""
-    return float(np.mean(np.asarray(nominal_scores) > threshold))
-
-
 def recall(anomalous_scores: np.ndarray, threshold: float) -> float:
     """Returns the share of anomalous scores above the threshold."""
     return float(np.mean(np.asarray(anomalous_scores) > threshold))

@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 RESIDUAL = "residual"
-"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`detectors.ResidualSize`). It needs
+"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (see `scoring.Scorer`). It needs
 a simulator, so it is no member of `DETECTORS`."""
 
 

@@ -87,7 +87,7 @@ def choose_enhancer(
     stretches = np.unique(starts[held_out] // window, return_inverse=True)[1]
     variance = np.var(targets[held_out], axis=(0, 1), dtype=np.float64)
     variance = np.where(variance > 0, variance, 1.0)
-    learnt, fitted, squared = _Training(inputs[rows], targets[rows], starts[rows]), {}, {}
+    learnt, fitted, squared = Training(inputs[rows], targets[rows], starts[rows]), {}, {}
     for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
         progress.step(f"enhancer {name}")
         fitted[name] = learnt.fit(name, seed, epochs)
@@ -95,7 +95,7 @@ def choose_enhancer(
         squared[name] = np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
     judged, penalties = judge(squared), learnt.ridge.chosen
     chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
-    enhancer = _Training(inputs, targets, starts, penalties).fit(chosen, seed, epochs)
+    enhancer = Training(inputs, targets, starts, penalties).fit(chosen, seed, epochs)
     return Choice(enhancer, judged, edges, fitted[chosen], penalties)
 
 
@@ -114,34 +114,15 @@ def _standard_error(values: np.ndarray) -> float:
     return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
 
 
-def fit_enhancer(
-    name: str,
-    inputs: np.ndarray,
-    targets: np.ndarray,
-    starts: np.ndarray,
-    seed: int = 0,
-    epochs: int = 6,
-    penalties: Sequence[float] | None = None,
-) -> Enhancer:
-    """Fits one candidate to all of the given windows.
+class Training:
+    """Windows that candidates are fitted to; the ridge regression on them is fitted once, for both candidates with one.
 
     Args:
-        name: One of `CANDIDATES`.
         inputs: Coarse windows, shape `(windows, samples, columns)`.
         targets: Telemetry windows, shape `(windows, samples, channels)`.
         starts: First sample of each window, shape `(windows,)`.
-        seed: Random seed of the network and the random features.
-        epochs: Passes of the network over the windows.
         penalties: Penalty of each channel, as `Choice.penalties` of similar windows; None: chosen by blocks of time.
-
-    Raises:
-        InputError: If the name is unknown, or the training diverges.
     """
-    return _Training(inputs, targets, starts, penalties).fit(name, seed, epochs)
-
-
-class _Training:
-    """Windows that candidates are fitted to; the ridge regression on them is fitted once, for both candidates with one."""
 
     def __init__(self, inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray, penalties: Sequence[float] | None = None):
         self.inputs, self.targets, self.starts, self.penalties = inputs, targets, starts, penalties
@@ -155,8 +136,8 @@ class _Training:
         """Ridge regression in units of standard deviations."""
         return fit_ridge(self.rows, self.outputs, self.starts, num_channels=len(self.unit), chosen=self.penalties)
 
-    def fit(self, name: str, seed: int, epochs: int) -> Enhancer:
-        """Fits one candidate."""
+    def fit(self, name: str, seed: int = 0, epochs: int = 6) -> Enhancer:
+        """Fits one of `CANDIDATES` to all windows, as in `choose_enhancer`; raises InputError if there is none, or the training diverges."""
         if name in (COARSE, LEVEL_AND_GAIN):
             return self._keeping_the_shape(name)
         if name not in CANDIDATES:

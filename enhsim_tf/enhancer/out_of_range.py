@@ -18,12 +18,7 @@ class OutOfRange:
 
     where `unit` is the standard deviation of the training windows. Of four candidates, this form ranks degraded modes and waves in unseen
     phases best by the true error of the paper's enhancer: the residual alone is blind to unseen phases, and the distance alone gives full
-    weight to shifts that the enhancer follows well. `detection.metrics.threshold` of held-out nominal windows is a limit.
-
-    Example:
-    >>> out_of_range = OutOfRange().fit(coarse_training_windows)
-    >>> limit = metrics.threshold(out_of_range.score(coarse_held_out_windows), rate=0.01)
-    >>> trusted = out_of_range.score(coarse_degraded_windows) <= limit
+    weight to shifts that the enhancer follows well. A limit is `detection.metrics.threshold` of held-out nominal windows.
     """
 
     def fit(self, coarse_windows: np.ndarray) -> "OutOfRange":
@@ -41,16 +36,14 @@ class OutOfRange:
 
     def score(self, coarse_windows: np.ndarray) -> np.ndarray:
         """Scores coarse windows of shape `(windows, samples)`, float64 of shape `(windows,)`: close to 0 within the training range."""
-        windows = np.asarray(coarse_windows, np.float64)
-        with threadpool_limits(1):
-            chunks = [self._score(windows[begin : begin + _CHUNK]) for begin in range(0, len(windows), _CHUNK)]
-        return np.concatenate([np.zeros(0), *chunks])
-
-    def _score(self, windows: np.ndarray) -> np.ndarray:
         from scipy.spatial.distance import cdist
 
-        centred = windows - self._mean
-        coordinates = centred @ self._components.T
-        left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
-        nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
-        return np.sqrt((left + _WEIGHT * nearest) / windows.shape[1]) / self._unit
+        scores = np.empty(len(coarse_windows))
+        for begin in range(0, len(scores), _CHUNK):
+            centred = np.asarray(coarse_windows[begin : begin + _CHUNK], np.float64) - self._mean
+            with threadpool_limits(1):
+                coordinates = centred @ self._components.T
+                left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
+            nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
+            scores[begin : begin + _CHUNK] = np.sqrt((left + _WEIGHT * nearest) / centred.shape[1]) / self._unit
+        return scores

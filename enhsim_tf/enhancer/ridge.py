@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.windows import time_blocks
 
 PENALTIES = tuple(float(penalty) for penalty in np.logspace(-3, 6, 19))  # of standardised inputs, so they fit every unit
@@ -63,11 +62,10 @@ def fit_ridge(
 
     Returns:
         The regression, fitted to all windows.
-
-    Raises:
-        InputError: If shapes do not match.
     """
-    windows, targets, starts = _checked(inputs, targets, starts)
+    windows, targets = np.asarray(inputs, np.float64), np.asarray(targets, np.float64)
+    windows = windows[:, :, None] if windows.ndim == 2 else windows
+    starts = np.arange(len(windows)) * windows.shape[1] if starts is None else np.asarray(starts)
     if chosen is None:
         chosen = _choose_penalties(windows, targets, starts, np.asarray(penalties, np.float64), num_channels)
     solution, each = RidgeSolution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
@@ -126,15 +124,3 @@ class RidgeSolution:
     def coefficients(self, penalty: float | np.ndarray) -> np.ndarray:
         """Returns the weights for one penalty, or for a penalty of each output."""
         return self.moments / (np.maximum(self.values, 0.0)[:, None] + penalty)
-
-
-def _checked(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    windows, targets = np.asarray(inputs, np.float64), np.asarray(targets, np.float64)
-    windows = windows[:, :, None] if windows.ndim == 2 else windows
-    starts = np.arange(len(windows)) * windows.shape[1] if starts is None and windows.ndim == 3 else np.asarray(starts)
-    if windows.ndim != 3 or targets.ndim != 2 or not 0 < len(windows) == len(targets) == len(starts):
-        raise InputError(
-            "Expected inputs (windows, samples) or (windows, samples, columns), targets (windows, outputs) and one start per window. "
-            f"Received: {np.shape(inputs)}, {np.shape(targets)} and {np.shape(starts)}. Give the same windows to each."
-        )
-    return windows, targets, starts

@@ -2,8 +2,6 @@
 
 import functools
 import math
-from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -15,16 +13,6 @@ _NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over 
 _EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
 _BATCH = 2**19  # distances that are computed at a time, few enough for a processor's cache
 _MOST_LANDMARKS = 2_500  # stored signals whose neighbours are found, which bounds the time
-
-
-class NoiseModel(Protocol):
-    """What every noise model can do."""
-
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws noise for `number` windows; `signal` is the enhanced signal of the same shape, in the telemetry's unit."""
-
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws one series of noise; `signal` is the enhanced signal of the same shape."""
 
 
 def fit_noise(name: str, noise: np.ndarray, signal: np.ndarray) -> "WindowBootstrap":
@@ -57,17 +45,14 @@ class WindowBootstrap:
 
     def __init__(self, windows: np.ndarray, signals: np.ndarray | None = None):
         self.windows, self.signals = np.asarray(windows, np.float32), None if signals is None else np.asarray(signals, np.float32)
-        shape = self.windows.shape
-        if len(shape) not in (2, 3) or shape[0] < 1 or shape[1] < 4 or not np.isfinite(self.windows).all():
-            raise InputError(f"Expected finite windows of noise of at least 4 samples. Received: shape {shape}. Extract noise first.")
-        expected = (len(windows), min(_NUM_SEGMENTS, shape[1]) * math.prod(shape[2:]))
-        if self.signals is not None and not (self.signals.shape == expected and np.isfinite(self.signals).all()):
-            raise InputError(f"Expected the finite signal of each window, shape {expected}. Received: shape {self.signals.shape}.")
 
     @classmethod
     def fit(cls, windows: np.ndarray, signal: np.ndarray) -> "WindowBootstrap":
         """Stores windows of noise and the signal below them, of the same shape, which the noise follows."""
-        return cls(windows, _segment_means(signal, np.shape(windows)))
+        shape = np.shape(windows)
+        signal, edges = _checked_signal(signal, shape), _edges(shape[1])
+        sums = np.add.reduceat(np.asarray(signal, np.float64).reshape(*shape[:2], -1), edges[:-1], axis=1)
+        return cls(windows, (sums / np.diff(edges)[:, None]).reshape(shape[0], -1))
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws windows, float32 of shape `(number, samples, channels)`; `signal` is what the noise is added to, in the unit of the fit."""
@@ -76,17 +61,25 @@ class WindowBootstrap:
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws a series of any length without seams, float32 of shape `(num_samples, channels)`; see `generate`."""
         window, follows = self.windows.shape[1], self.signals is not None
+        fade = window // 4
+        hop = window - fade
+        lead = fade + int(rng.integers(0, hop))  # samples before the first one, so that every sample has the same distribution
+        starts = hop * np.arange(-(-(num_samples + lead) // hop)) - lead
+        below = None
         if follows:
             signal = _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(np.float32)
-
-        def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)] if follows else None
-            near = self._nearest(below, len(starts))
-            used, place = np.unique(near, return_inverse=True)
-            means = np.stack([self.windows[self._groups[each]].mean(axis=0) for each in used])
-            return self.windows[self._draw(near, rng)], means[place]
-
-        return _cross_faded(window, num_samples, rng, draw)
+            below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)]
+        near = self._nearest(below, len(starts))
+        used, place = np.unique(near, return_inverse=True)
+        common = np.stack([self.windows[self._groups[each]].mean(axis=0) for each in used])[place]
+        drawn = self.windows[self._draw(near, rng)]
+        rise = np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade)
+        weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]]).reshape(-1, *[1] * (drawn.ndim - 2))
+        pieces = weights * (drawn - common) + weights**2 * common  # the squares of the weights of two neighbours add up to one
+        series = np.zeros((len(starts) * hop + fade, *drawn.shape[2:]))
+        for number, piece in enumerate(pieces):
+            series[number * hop : number * hop + window] += piece
+        return series[lead : lead + num_samples].astype(np.float32)
 
     def _nearest(self, signal: np.ndarray | None, number: int) -> np.ndarray:
         if self.signals is None:
@@ -164,38 +157,9 @@ def _nearest_of(places: np.ndarray, known: np.ndarray, equal: float) -> list[np.
 def _checked_signal(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
     if signal is None or np.shape(signal) != shape:
         raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal)}.")
-    if not np.isfinite(signal).all():
-        raise InputError("Expected a finite enhanced signal, which this noise follows. Received: values that are not finite.")
     return np.asarray(signal)
 
 
 def _edges(window: int) -> np.ndarray:
     """Edges of segments of nearly equal length."""
     return np.linspace(0, window, min(_NUM_SEGMENTS, window) + 1).astype(int)
-
-
-def _segment_means(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
-    """Returns the means of signals over segments, shape `(windows, segments * channels)`."""
-    signal, edges = _checked_signal(signal, shape), _edges(shape[1])
-    sums = np.add.reduceat(np.asarray(signal, np.float64).reshape(*shape[:2], -1), edges[:-1], axis=1)
-    return (sums / np.diff(edges)[:, None]).reshape(shape[0], -1).astype(np.float32)
-
-
-def _cross_faded(
-    window: int, num_samples: int, rng: np.random.Generator, draw: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | float]]
-) -> np.ndarray:
-    """Joins windows of noise to a series without seams; `draw` returns windows that begin at given samples, and what neighbours have in common."""
-    fade = window // 4
-    hop = window - fade
-    lead = int(rng.integers(0, hop))  # where the first window begins, so that every sample has the same distribution
-    num_windows = -(-(num_samples + lead + fade) // hop)
-    rise = np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade)
-    weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]])
-    begin = fade + lead
-    drawn, common = draw(hop * np.arange(num_windows) - begin)
-    weights = weights.reshape(-1, *[1] * (drawn.ndim - 2))
-    pieces = weights * (drawn - common) + weights**2 * common  # the squares of the weights of two neighbours add up to one
-    series = np.zeros((num_windows * hop + fade, *drawn.shape[2:]))
-    for number, piece in enumerate(pieces):
-        series[number * hop : number * hop + window] += piece
-    return series[begin : begin + num_samples].astype(np.float32)

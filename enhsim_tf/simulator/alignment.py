@@ -51,11 +51,6 @@ class Waves:
         self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the coarse columns: one for each channel."""
-        return tuple(f"{simulator.columns[0]} of {name}" for simulator, name in zip(self.simulators, self.channels, strict=True))
-
-    @property
     def longest_period(self) -> float:
         """The longest period of a wave in samples; 0 if nothing is periodic."""
         return max((each.waves[0].period_s for each in self.simulators if not each.is_constant), default=0.0) / self.interval_s
@@ -156,13 +151,11 @@ class Waves:
         simulator, length = self.simulators[channel], int(starts.max(initial=0)) + self.window
         if length > len(self._series[channel]):
             if 2 * len(starts) * self.window < length:
-                return self._in_unit(channel, simulator.simulate(self._times(starts)))[:, :, None]
+                each = self.interval_s * (starts[:, None] + np.arange(self.window))
+                return self._in_unit(channel, simulator.simulate(each))[:, :, None]
             times = self.interval_s * np.arange(1 << length.bit_length())  # the next windows are hardly ever beyond its end
             self._series[channel] = self._in_unit(channel, simulator.simulate(times[None]))[0][:, None]
         return cut(self._series[channel : channel + 1], starts, self.window)
-
-    def _times(self, starts: np.ndarray) -> np.ndarray:
-        return self.interval_s * (starts[:, None] + np.arange(self.window))
 
     def _concerned(self, scenario: Degraded) -> Sequence[int]:
         if scenario.channel is None:

@@ -4,7 +4,7 @@ Square waves need a period that occurs at least twice. Commands need no period. 
 what comes when, and says so.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from typing import NamedTuple
 
 import numpy as np
@@ -53,10 +53,7 @@ def choose_coarse(
     name, longest = parts[0].name, max(parts, key=len)
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
     if len(values) < LEAST_SAMPLES:
-        raise InputError(
-            f"Expected at least {LEAST_SAMPLES} samples, {LEAST_LEARNT} windows of {FEWEST_SAMPLES}. Received: {len(values)} of {name}. "
-            "Give more telemetry."
-        )
+        raise too_short(FEWEST_SAMPLES, name, parts)
     coarse, about_wave, period, by_wave = (None, refused, np.nan, 0.0) if refused else _square_wave(longest)
     traces, by_commands = (None, 0.0) if commands is None else _explained_by_commands(parts, commands)
     is_wave_sure = by_commands <= by_wave and len(longest) >= _FEW_PERIODS * period  # few periods may be found in any slow telemetry
@@ -70,10 +67,7 @@ def choose_coarse(
     wanted = window or default_window(len(values))
     fitting = _fitting_window(parts, wanted, wanted if window else FEWEST_SAMPLES)
     if not fitting:
-        raise InputError(
-            f"Expected at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from. Received: {len(values):,} samples of "
-            f"{name} that are not held out, the longest part {len(longest):,}. Give more telemetry, or a smaller --window or --held-out."
-        )
+        raise too_short(window or FEWEST_SAMPLES, name, parts)
     if traces is not None and by_commands:
         said = (
             f"coarse simulator: traces of {len(traces.chosen)} of the commands, which explain {by_commands:.0%} of the variance on held-out time; "
@@ -86,6 +80,15 @@ def choose_coarse(
     )
     level = ConstantLevel(values.mean(), values.std(), 2 * fitting * longest.interval_s)
     return CoarseChoice(fitting, said, level)
+
+
+def too_short(window: int, name: str, parts: Sequence[Sized]) -> InputError:
+    """Makes the error about parts that do not have enough windows to learn from."""
+    lengths, least = [len(part) for part in parts], LEAST_LEARNT * window
+    return InputError(
+        f"Expected at least {least:,} samples to learn from, {LEAST_LEARNT} windows of {window}. Received: {sum(lengths):,} samples of {name} that are "
+        f"not held out, the longest part {max(lengths, default=0):,}. Give more telemetry, or a smaller --window or --held-out."
+    )
 
 
 def _square_wave(telemetry: Telemetry) -> tuple[SquareWaveSimulator | None, str, float, float]:

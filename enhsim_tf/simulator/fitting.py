@@ -15,13 +15,13 @@ from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, choose_enhancer, fit_enhancer, split_fold
+from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, Training, choose_enhancer, split_fold
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
 from enhsim_tf.noise.names import MATCHED, RESIDUAL_WINDOWS
 from enhsim_tf.noise.window_bootstrap import fit_noise
 from enhsim_tf.simulator.alignment import Runs, Waves
-from enhsim_tf.simulator.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse
+from enhsim_tf.simulator.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse, too_short
 from enhsim_tf.simulator.detector_choice import choose_detector, judge_detectors
 from enhsim_tf.simulator.joint import join_channels, long_enough, split_end, telemetry_of, times_of, windows_of
 from enhsim_tf.simulator.options import LEAST_LEARNT, FitOptions, default_window
@@ -118,12 +118,11 @@ def _fit_waves(
         window = max(each.window for each in choices)
         usable = long_enough(learnt, window)
         if usable is None or len(usable) < LEAST_LEARNT * window:
-            raise InputError(
-                f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {len(learnt):,} samples of {recording.name} that are "
-                f"not held out, the longest part {max(map(len, learnt.parts)):,}. Give more telemetry, or a smaller --window or --held-out."
-            )
+            raise too_short(window, recording.name, learnt.parts)
         try:
-            return _fit_aligned(usable, long_enough(held_out, window), choices, window, options, progress, said)
+            simulator, report = _fit_aligned(usable, long_enough(held_out, window), choices, window, options, progress, said)
+            simulator.nominal = long_enough(recording, window)  # thresholds know all nominal telemetry that was given
+            return simulator, report
         except _FlatError as error:
             refused[error.channel] = "nothing can be learnt from its best square wave, which its windows do not follow"
 
@@ -205,7 +204,7 @@ def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tu
             waveforms.append(None)
             if not simulator.is_constant:
                 some = np.flatnonzero(kept)[:_NUM_WAVEFORM]
-                ridge = fit_enhancer(RIDGE, coarse[some][:, :, [channel]], wanted[some][:, :, [channel]], times[some])
+                ridge = Training(coarse[some][:, :, [channel]], wanted[some][:, :, [channel]], times[some]).fit(RIDGE)
                 waveforms[-1] = ridge.predict(waves.phases(channel)[:, :, None])[:, :, 0]
         waves = Waves(waves.simulators, waves.channels, waves.interval_s, waves.window, waveforms)
 
@@ -232,14 +231,12 @@ def _fit_runs(
             f"{len(paired):,} of {len(recording):,} samples of the telemetry have a coarse run of the same time; the others are not used"
         )
     run_there, left_out = _without_constant(run_there)
+    whole, whole_run = (long_enough(each, window) for each in (paired, run_there))
     (learnt, held_out), (learnt_run, held_out_run) = (
-        [long_enough(each, window) for each in split_end(long_enough(some, window), options.held_out)] for some in (paired, run_there)
+        [long_enough(each, window) for each in split_end(some, options.held_out)] for some in (whole, whole_run)
     )
     if learnt is None or len(learnt) < LEAST_LEARNT * window:
-        raise InputError(
-            f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {0 if learnt is None else len(learnt):,} samples that "
-            f"{recording.name} and {run.name} share, in stretches at least as long as a window. Give longer runs or a smaller --window."
-        )
+        raise too_short(window, f"{recording.name} with {run.name}", () if learnt is None else learnt.parts)
     number = _num_windows(options, window, len(recording.columns))
     starts = evenly_spaced_starts(learnt.parts, window, number)
     (inputs, targets), times = (windows_of(each, starts, window) for each in (learnt_run, learnt)), times_of(learnt, starts, window)
@@ -249,7 +246,10 @@ def _fit_runs(
     residuals = _held_out_residuals(simulator, choice, inputs, targets, times, options)
 
     noise, clean = np.split(windows_of(residuals, evenly_spaced_starts(residuals.parts, window, number), window), 2, axis=2)
-    return _finish(simulator, choice, noise, clean, options, held_out, held_out_run, said, [*notes, *left_out], progress)
+    simulator, report = _finish(simulator, choice, noise, clean, options, held_out, held_out_run, said, [*notes, *left_out], progress)
+    simulator.nominal, alignment.nominal = whole, whole_run  # thresholds know all nominal telemetry that was given
+    vars(simulator).pop("_nominal_clean", None)
+    return simulator, report
 
 
 def _run_of(coarse: CoarseSimulator, recording: Recording) -> tuple[Recording, list[str]]:
@@ -305,8 +305,8 @@ def _held_out_residuals(
         enhancer: Enhancer = choice.without_fold
         if fold:
             kept, _ = split_fold(times, window, choice.edges, fold)
-            windows = inputs[kept], targets[kept], times[kept]
-            enhancer = fit_enhancer(enhancer.name, *windows, options.seed, options.epochs, choice.penalties)
+            training = Training(inputs[kept], targets[kept], times[kept], choice.penalties)
+            enhancer = training.fit(enhancer.name, options.seed, options.epochs)
         other = EnhancedSimulator(simulator.alignment, enhancer, None, simulator.channels, simulator.interval_s)
         for block in range(fold, len(choice.edges) - 1, NUM_FOLDS):
             for part, coarse in zip(learnt.parts, run.parts, strict=True):
@@ -359,22 +359,4 @@ def _finish(
         "keeps_promise": bool(chosen.keeps),
         "false_alarms": chosen.false_alarms,
     }
-    report = make_report(simulator, choice, detectors, judged_on, judged_run, held_out is not None, said, notes, options.seed)
-    if held_out is not None:  # thresholds know all nominal telemetry that was given
-        simulator.nominal = _joined(learnt, held_out)
-        if run is not None:
-            simulator.alignment.nominal = _joined(run, held_out_run)
-            vars(simulator).pop("_nominal_clean", None)
-    return simulator, report
-
-
-def _joined(first: Recording, second: Recording) -> Recording:
-    """Puts the end of telemetry behind its beginning again; parts that meet become one."""
-    parts = list(first.parts)
-    for part in second.parts:
-        last = parts[-1]
-        if abs(last.offset_s + len(last) * first.interval_s - part.offset_s) < 0.5 * first.interval_s:
-            parts[-1] = Run(np.concatenate([last.values, part.values]), last.offset_s)
-        else:
-            parts.append(part)
-    return dataclasses.replace(first, parts=tuple(parts))
+    return simulator, make_report(simulator, choice, detectors, judged_on, judged_run, held_out is not None, said, notes, options.seed)

@@ -27,10 +27,10 @@ _NUMBER = "6"  # of the format
 _FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
 
 
-def encode_name(name: str) -> str:
-    """Percent-encodes a name, such as a channel's, for use as a file or folder name; `urllib.parse.unquote` restores it.
+def folder_of(models: str | os.PathLike, name: str) -> Path:
+    """Returns the folder of a channel or model: its name, percent-encoded, which `urllib.parse.unquote` restores.
 
-    The result cannot point outside its folder, is not hidden, and is not a name that Windows reserves.
+    It is within the folder of the models, is not hidden, and has no name that Windows reserves.
 
     Raises:
         InputError: If the name is empty, too long for a file, or not valid Unicode.
@@ -47,12 +47,7 @@ def encode_name(name: str) -> str:
             f"Expected a channel name of 1 to {_MAX_CHARACTERS} letters (signs and letters beyond ASCII count for three or more). "
             f"Received: {name[:60]!r} with {len(found)}. Rename it, or name the other channels."
         )
-    return found
-
-
-def folder_of(models: str | os.PathLike, channel: str) -> Path:
-    """Returns the folder of a channel: its name, percent-encoded. An `InputError` refuses names that are empty or too long."""
-    return Path(models) / encode_name(channel)
+    return Path(models) / found
 
 
 def name_of_channels(channels: Sequence[str]) -> str:

@@ -45,21 +45,7 @@ def _check(field: dataclasses.Field, value: Any) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class FitOptions:
-    """Options of a fit. The defaults are those of the command `fit`.
-
-    Args:
-        window: Length of a window in samples.
-        num_windows: Number of training windows.
-        epochs: Passes of a network over the training windows.
-        noise: Name of the noise model. None: matched residual windows for square waves, residual windows for a recorded run.
-        enhancer: Name of the enhancer, or `best`.
-        held_out: Share of the telemetry, taken from its end, on which the report is measured. 0 fits and reports on all of it.
-        delay_s: Delay of the telemetry relative to a recorded run, in seconds.
-        seed: Random seed.
-
-    Raises:
-        InputError: If a value is out of range.
-    """
+    """Options of a fit, as those of the command `fit`: each field says what it is. Raises InputError if a value is out of range."""
 
     window: int | None = _option(
         None,
@@ -80,7 +66,13 @@ class FitOptions:
         "paper's",
         choices=(BEST, *CANDIDATES),
     )
-    held_out: float = _option(0.2, "share of the telemetry held out for the report (default: 0.2)", least=0, most=0.5, kind=float)
+    held_out: float = _option(
+        0.2,
+        "share of the telemetry, from its end, held out for the report; 0 reports on all of it (default: 0.2)",
+        least=0,
+        most=0.5,
+        kind=float,
+    )
     delay_s: float | None = _option(
         None,
         "delay of the telemetry relative to the recorded run, in seconds, or in samples if there are no times (default: estimated)",
@@ -95,19 +87,9 @@ class FitOptions:
 
 @dataclasses.dataclass(frozen=True)
 class ScoreOptions:
-    """Options of scoring.
+    """Options of scoring, as those of the command `score`. Raises InputError if the detector is unknown or a number is out of range."""
 
-    Args:
-        detector: Name of a detector, or None for the one that the fit chose by held-out time.
-        num_windows: Number of generated nominal windows from which the detector learns.
-        false_alarm_rate: Share of nominal samples to flag.
-        seed: Random seed.
-
-    Raises:
-        InputError: If the detector is unknown or a number is out of range.
-    """
-
-    detector: str | None = None
+    detector: str | None = None  # the one that the fit chose by held-out time
     num_windows: int = _option(2_000, "generated windows from which the detector learns (default: 2000)", least=10, option="--windows")
     false_alarm_rate: float = _option(0.01, "share of nominal samples to flag (default: 0.01)", least=1e-9, most=0.5, kind=float)
     seed: int = _option(0, "random seed (default: 0)", least=0, most=2**31 - 1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import printable, spoken
-from enhsim_tf.enhancer.candidates import Choice, fit_enhancer
+from enhsim_tf.enhancer.candidates import Choice, Training
 from enhsim_tf.enhancer.names import COARSE
 from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
 from enhsim_tf.simulator.joint import nrmse, windows_of
@@ -66,17 +66,15 @@ class Report:
 
     def warnings(self) -> list[str]:
         """Returns what should keep a reader from trusting the simulator, the first of `lines`."""
-        found = []
+        (used,), found = [each for each in self.detectors if each["name"] == self.detector], []
         if not self.keeps_promise:
-            (alarms,) = [each["false_alarms"] for each in self.detectors if each["name"] == self.detector]
             found.append(
-                f"WARNING: no detector keeps its promise; the best, {self.detector}, flags {alarms:.0%} of nominal telemetry at {RATE:.0%} set. "
+                f"WARNING: no detector keeps its promise; the best, {self.detector}, flags {used['false_alarms']:.0%} of nominal telemetry at {RATE:.0%} set. "
                 "Do not trust its alarms"
             )
-        (recall,) = [each["recall"] for each in self.detectors if each["name"] == self.detector]
-        if recall < _LEAST_RECALL:
+        if used["recall"] < _LEAST_RECALL:
             found.append(
-                f"WARNING: {self.detector}, the detector that score uses, finds only {recall:.0%} of the injected anomalies, so a fault can go unseen. "
+                f"WARNING: {self.detector}, the detector that score uses, finds only {used['recall']:.0%} of the injected anomalies, so a fault can go unseen. "
                 "Compare the line of the detectors; another --window, or --detector of score, may find more"
             )
         return found
@@ -126,7 +124,7 @@ def make_report(
     real, clean = simulator.windows_and_signal(judged, run, _NUM_WINDOWS)
     plain, outside = _coarse_signal(simulator, real, run)
     noise = real - clean
-    generated = simulator.draw_noise(simulator.generate_clean(len(real), seed=seed), np.random.default_rng([seed, 5]))
+    generated = simulator.draw_noise(simulator.generate(len(real), seed=seed, with_noise=False), np.random.default_rng([seed, 5]))
     errors = {"coarse": nrmse(plain, real), "enhanced": nrmse(clean, real)}
     shown = int(np.argsort(np.mean(noise**2, axis=(1, 2)))[len(noise) // 2])
     trained = simulator.trained
@@ -160,16 +158,13 @@ def _coarse_signal(simulator: EnhancedSimulator, real: np.ndarray, run: Recordin
     trusted, starts = TrustedRange(simulator), evenly_spaced_starts(run.parts, simulator.window, _NUM_WINDOWS)
     coarse = windows_of(run, starts, simulator.window)
     outside = np.concatenate([trusted.score_run(part.values) for part in run.parts]) > 1
-    return fit_enhancer(COARSE, coarse, real, np.arange(len(real))).predict(coarse), float(outside.mean())
+    return Training(coarse, real, np.arange(len(real))).fit(COARSE).predict(coarse), float(outside.mean())
 
 
 def correlation_of(windows: np.ndarray) -> np.ndarray:
     """Returns the correlation of the channels of windows of noise, shape `(channels, channels)`, 0 for a constant channel."""
-    rows = np.asarray(windows, np.float64).reshape(-1, windows.shape[2])
-    covariance = np.cov(rows, rowvar=False).reshape(rows.shape[1], -1)
-    size = np.sqrt(np.diag(covariance))
-    size = np.where(size > 0, size, 1.0)
-    return covariance / size[:, None] / size
+    with np.errstate(invalid="ignore"):
+        return np.nan_to_num(np.corrcoef(windows.reshape(-1, windows.shape[2]), rowvar=False, dtype=np.float64))
 
 
 def _cross_correlation(channels: Sequence[str], real: np.ndarray, generated: np.ndarray) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.detection import metrics
-from enhsim_tf.detection.detectors import JointSize, ResidualSize, root_mean_square
+from enhsim_tf.detection.detectors import JointSize, following_drift, root_mean_square
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import DETECTORS, RESIDUAL
 from enhsim_tf.enhancer.model import run_starts
@@ -38,8 +38,6 @@ _CHUNK_VALUES = 4_000_000  # values of windows that are scored at a time
 _NOMINAL_VALUES = 2_000_000  # most values of nominal telemetry with which a threshold is set
 LEARNT, NEW = "learnt", "new operating point"
 """What an event departs from."""
-DEFAULT = "PCA residual"
-"""The detector of a simulator whose fit chose none."""
 
 
 class Scorer:
@@ -57,26 +55,24 @@ class Scorer:
     def __init__(self, simulator: EnhancedSimulator, options: ScoreOptions | None = None):
         self.simulator, self.options = simulator, options or ScoreOptions()
         self.window = simulator.window
-        self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", DEFAULT))).detector
+        self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", "PCA residual"))).detector
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
         # of the generated series, in windows
         self._length = int(np.clip(_SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS))
         seed = self.options.seed
+        training = simulator.generate(self.options.num_windows, seed=seed, with_noise=not simulator.is_run_model)
         if simulator.is_run_model:
-            training = simulator.draw_noise(simulator.generate_clean(self.options.num_windows, seed=seed), np.random.default_rng([seed, 3]))
-        else:
-            training = simulator.generate(self.options.num_windows, seed=seed)
-        self.detector = ResidualSize() if self.name == RESIDUAL else DETECTORS[self.name](seed)
+            training = simulator.draw_noise(training, np.random.default_rng([seed, 3]))
         means = training.mean(axis=1, dtype=np.float64)
         width = np.maximum(np.ptp(means, axis=0), simulator.noise_sd)
         self._low, self._high = means.min(axis=0) - width, means.max(axis=0) + width  # levels beyond count as residual
         if self.name == RESIDUAL:
             self._joint = None if len(simulator.channels) == 1 else JointSize().fit(self._judged(training))
-            self.detector.fit_sizes(self._sizes(training))
+            self.typical_size = float(np.median(self._sizes(training)))
         else:
-            self.detector.fit(self._judged(training))
+            self.detector = DETECTORS[self.name](seed).fit(self._judged(training))
         generated, self.rate = metrics.finite_threshold(self._of_generated(seed + 1), self.options.false_alarm_rate, self._length)
         self.nominal_threshold = -np.inf
         for real in self._of_nominal():
@@ -129,7 +125,7 @@ class Scorer:
         chunks = (begins[first : first + step] for first in range(0, len(begins), step))
         scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
         if self.name == RESIDUAL:  # its scale follows the windows before, so it sees all sizes at once
-            scores = self.detector.score_sizes(scores)
+            scores = following_drift(scores, self.typical_size)
         return mean_over_windows(scores, begins, self.window, len(series))
 
     def _sizes(self, windows: np.ndarray) -> np.ndarray:

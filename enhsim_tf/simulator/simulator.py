@@ -16,7 +16,7 @@ from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.read_errors import READ_ERRORS, short_reason
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
-from enhsim_tf.noise.window_bootstrap import NoiseModel
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
 from enhsim_tf.simulator.joint import cut, rounded, windows_of
@@ -58,7 +58,7 @@ class EnhancedSimulator:
         self,
         alignment: Alignment,
         enhancer: Enhancer,
-        noise: NoiseModel,
+        noise: WindowBootstrap,
         channels: Sequence[str] = ("telemetry",),
         interval_s: float = 1.0,
         levels: np.ndarray | None = None,
@@ -92,12 +92,12 @@ class EnhancedSimulator:
     @functools.cached_property
     def noise_sd(self) -> np.ndarray:
         """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
-        return np.std(self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0)), axis=(0, 1), dtype=np.float64)
+        return np.std(self.draw_noise(self.generate(_NUM_NOISE, with_noise=False), np.random.default_rng(0)), axis=(0, 1), dtype=np.float64)
 
     @functools.cached_property
     def scale(self) -> np.ndarray:
         """Standard deviation of the generated telemetry of each channel, shape `(channels,)`; 1 for a constant one."""
-        deviation = np.hypot(np.std(self.generate_clean(_NUM_NOISE), axis=(0, 1), dtype=np.float64), self.noise_sd)
+        deviation = np.hypot(np.std(self.generate(_NUM_NOISE, with_noise=False), axis=(0, 1), dtype=np.float64), self.noise_sd)
         return np.where(deviation > 0, deviation, 1.0)
 
     # enhancement
@@ -166,19 +166,16 @@ class EnhancedSimulator:
         draw = self.noise.generate if np.ndim(clean) == 3 else self.noise.generate_series
         return check_finite(draw(len(clean), rng, clean))
 
-    def add_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Adds noise to an enhanced signal and rounds quantised channels to their levels."""
-        return rounded(clean + self.draw_noise(clean, rng), self.quantisation)
-
     # windows
 
-    def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+    def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0, with_noise: bool = True) -> np.ndarray:
         """Generates realistic telemetry windows: enhanced signal plus generated noise ("Combined").
 
         Args:
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
             seed: Random seed of start times, scenario and noise. The same seed gives the same windows.
+            with_noise: Whether noise is added to the enhanced signal.
 
         Returns:
             float32 array of shape `(num_windows, samples, channels)`, in the telemetry's unit.
@@ -186,11 +183,12 @@ class EnhancedSimulator:
         Raises:
             InputError: If `num_windows` is negative or not a whole number, or a scenario cannot be applied.
         """
-        return self._joined(num_windows, scenario, seed)
-
-    def generate_clean(self, num_windows: int, seed: int = 0) -> np.ndarray:
-        """Returns the nominal windows of `generate` before noise is added."""
-        return self._joined(num_windows, None, seed, with_noise=False)
+        _check_count("num_windows", num_windows, 0)
+        windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
+        for chunk, _ in self.generate_labelled_chunks([scenario] * num_windows, seed, with_noise):
+            windows[filled : filled + len(chunk)] = chunk
+            filled += len(chunk)
+        return windows
 
     def generate_labelled_chunks(
         self, scenarios: Sequence[Degraded | None], seed: int = 0, with_noise: bool = True
@@ -207,37 +205,15 @@ class EnhancedSimulator:
         for first in range(0, num_windows, chunk):
             some = slice(first, first + chunk)
             drawn = self.alignment.draw(starts[some], scenarios[some], rng)
+            levels = () if self.levels is None else np.moveaxis(self.levels[rows[some]], 2, 0)  # offset and gain of each window and channel
+            clean = windows = self.enhance(drawn.nominal, *levels)
+            mask = np.zeros(clean.shape, bool)
             degraded = [row for row, scenario in enumerate(scenarios[some]) if scenario is not None]
-            yield self._complete(drawn, degraded, None if self.levels is None else self.levels[rows[some]], noise_rng)
-
-    def _joined(self, num_windows: int, scenario: Degraded | None, seed: int, with_noise: bool = True) -> np.ndarray:
-        _check_count("num_windows", num_windows, 0)
-        windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
-        for chunk, _ in self.generate_labelled_chunks([scenario] * num_windows, seed, with_noise):
-            windows[filled : filled + len(chunk)] = chunk
-            filled += len(chunk)
-        return windows
-
-    def _complete(
-        self, drawn: Drawn, degraded: list[int], levels: np.ndarray | None, noise_rng: np.random.Generator | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Completes coarse windows to telemetry; returns float32 windows, and a mask of the samples that a degraded mode has changed.
-
-        `degraded` are the numbers of the windows with a degraded mode; the others are enhanced once. `levels` are offset and gain of each
-        window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the nominal signal, so samples that are
-        not marked equal the nominal ones to the bit.
-        """
-
-        def enhanced(coarse: np.ndarray, rows: slice | list[int]) -> np.ndarray:
-            return self.enhance(coarse[rows], *(() if levels is None else (levels[rows, :, 0], levels[rows, :, 1])))
-
-        clean = windows = enhanced(drawn.nominal, slice(None))
-        mask = np.zeros(clean.shape, bool)
-        if degraded:
-            windows, some = clean.copy(), Drawn(*(None if each is None else each[degraded] for each in drawn))
-            changed, fade = enhanced(drawn.coarse, degraded), fade_length(self.window)
-            windows[degraded], mask[degraded] = put_changes(clean[degraded], changed, some, [(0, self.window)], fade, self._tolerance)
-        return (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
+            if degraded:
+                windows, own = clean.copy(), Drawn(*(None if each is None else each[degraded] for each in drawn))
+                changed, fade = self.enhance(own.coarse, *(each[degraded] for each in levels)), fade_length(self.window)
+                windows[degraded], mask[degraded] = put_changes(clean[degraded], changed, own, [(0, self.window)], fade, self._tolerance)
+            yield (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
 
     @property
     def _tolerance(self) -> np.ndarray:
@@ -247,7 +223,7 @@ class EnhancedSimulator:
     def _with_noise(
         self, windows: np.ndarray, clean: np.ndarray, mask: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Adds noise that follows the nominal signal; where rounding removes a change, it is not marked."""
+        """Adds noise that follows the nominal signal, so that other samples equal the nominal ones; where rounding removes a change, it is not marked."""
         noise = self.draw_noise(clean, rng)
         values = rounded(check_finite(windows + noise), self.quantisation)
         if mask.any():
@@ -287,7 +263,7 @@ class EnhancedSimulator:
         if self.is_run_model:
             self.alignment.draw(np.zeros(0, int), [scenario, *schedule], noise_rng)  # refuses them
             clean = self.nominal_series(num_samples)
-            return self.add_noise(clean, noise_rng), np.zeros(clean.shape, bool), []
+            return *self._with_noise(clean, clean, np.zeros(clean.shape, bool), noise_rng), []
         events = [(Degraded(each.kind, each.severity, 0.0), each.begin, each.end) for each in schedule]
         events += [] if scenario is None else [(scenario, 0, num_samples)]
         window, hop = self.window, self.window // 2
@@ -347,7 +323,7 @@ class EnhancedSimulator:
         clean = [self.enhance_run(part.values) for part in self.recorded_runs().usable(run).parts]
         for number in range(num_copies):
             rng = np.random.default_rng([seed, 1, number])
-            yield [self.add_noise(enhanced, rng) for enhanced in clean]
+            yield [rounded(enhanced + self.draw_noise(enhanced, rng), self.quantisation) for enhanced in clean]
 
     def recorded_runs(self) -> Runs:
         """Returns the alignment of a simulator of recorded runs; raises InputError if it is one of square waves."""

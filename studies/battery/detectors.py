@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.detection import metrics
-from enhsim_tf.enhancer.candidates import block_edges, fit_enhancer, split_fold
+from enhsim_tf.enhancer.candidates import Training, block_edges, split_fold
 from studies.battery.faults import ALL, Fault, columns_of
 from studies.battery.orbits import ORBIT_SAMPLES
 from studies.battery.record import WINDOW, PairWindows, Runs, coarse_windows, judged_windows, pair_windows, run_key
@@ -48,7 +48,8 @@ class Judge:
 
     def _fit(self, rows: Any) -> Callable[[np.ndarray], np.ndarray]:
         pairs = self.pairs
-        enhancer = fit_enhancer(self.candidate, pairs.coarse[rows], pairs.telemetry[rows][:, :, None], pairs.starts[rows], self.seed)
+        training = Training(pairs.coarse[rows], pairs.telemetry[rows][:, :, None], pairs.starts[rows])
+        enhancer = training.fit(self.candidate, self.seed)
         return lambda coarse: enhancer.predict(coarse)[:, :, 0]
 
     @functools.cached_property

@@ -6,14 +6,14 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.noise.names import MATCHED, NONE, RESIDUAL_WINDOWS
-from enhsim_tf.noise.window_bootstrap import NoiseModel, fit_noise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap, fit_noise
 
 CANDIDATES = (NONE, "gaussian", "autoregression", RESIDUAL_WINDOWS, MATCHED)
 """The noise models that need no training, the simplest first."""
 _MOST_ORDER = 200  # of the autoregression
 
 
-def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> NoiseModel:
+def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> "GaussianNoise | WindowBootstrap":
     """Fits one of `CANDIDATES` to windows of noise and the enhanced signal below them, both of shape `(windows, samples, channels)`."""
     if name == "gaussian":
         return GaussianNoise.fit(noise)

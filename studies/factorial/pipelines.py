@@ -149,11 +149,12 @@ class Pipelines:
         return lambda coarse: enhancer.predict(coarse[:, :, None])[:, :, 0]
 
     def _train_second(self, folder: Path) -> None:
-        from enhsim_tf.enhancer.candidates import fit_enhancer
+        from enhsim_tf.enhancer.candidates import Training
 
         self.stages.progress.step("enhancer network")
         starts = self.training_starts(MANY)
-        enhancer = fit_enhancer(NETWORK, *(each[:, :, None] for each in self.pairs(starts)), starts, self.seed, self.settings.second.epochs)
+        training = Training(*(each[:, :, None] for each in self.pairs(starts)), starts)
+        enhancer = training.fit(NETWORK, self.seed, self.settings.second.epochs)
         arrays = {"centre": enhancer.centre, "bias": enhancer.bias}
         for layer, (kernel, bias) in enumerate(enhancer.layers):
             arrays |= {f"kernel_{layer}": kernel, f"bias_{layer}": bias}

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.noise.window_bootstrap import NoiseModel
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from studies.common import evaluation
 from studies.common.detectors import DETECTORS
-from studies.common.gaussian_noise import CANDIDATES, fit_candidate
+from studies.common.gaussian_noise import CANDIDATES, GaussianNoise, fit_candidate
 from studies.common.settings import Settings
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 from studies.noise_models.real_floor import RealFloor, Row
@@ -87,7 +87,7 @@ class Cell:
         compared = [more + model.generate(number, rng, more[:, :, None])[:, :, 0] - more for _ in range(_NUM_DRAWS)]
         return arms, compared
 
-    def _fit(self, name: str) -> NoiseModel:
+    def _fit(self, name: str) -> "GaussianNoise | WindowBootstrap | _OneChannel":
         noise, clean, starts = self._learnt
         if name != LEARNT:
             return fit_candidate(name, noise, clean)

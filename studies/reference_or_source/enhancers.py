@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.enhancer.candidates import fit_enhancer
+from enhsim_tf.enhancer.candidates import Training
 
 Map = Callable[[np.ndarray], np.ndarray]
 _COMPONENTS, _FEATURES = 200, 3_000
@@ -32,7 +32,7 @@ def fit_map(name: str, coarse: np.ndarray, telemetry: np.ndarray, starts: np.nda
         return _random_features(coarse, telemetry, folds, seed)
     if name == "convolution":
         return _convolution(coarse, telemetry, starts, seed)
-    return fit_enhancer(name, coarse, telemetry, starts, seed).predict
+    return Training(coarse, telemetry, starts).fit(name, seed).predict
 
 
 def _random_features(coarse: np.ndarray, telemetry: np.ndarray, folds: np.ndarray, seed: int) -> Map:
@@ -68,7 +68,7 @@ def _convolution(coarse: np.ndarray, telemetry: np.ndarray, starts: np.ndarray, 
     from enhsim_tf.common.backend import keras
     from studies.common.training import seeded_initialiser
 
-    ridge = fit_enhancer("ridge", coarse, telemetry, starts, seed)
+    ridge = Training(coarse, telemetry, starts).fit("ridge", seed)
     left = telemetry - ridge.predict(coarse)
     mean, deviation, unit = coarse.mean(axis=(0, 1)), coarse.std(axis=(0, 1)) + 1e-6, float(left.std()) or 1.0
     keras.utils.set_random_seed(seed)

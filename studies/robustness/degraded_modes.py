@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.enhancer.candidates import fit_enhancer
+from enhsim_tf.enhancer.candidates import Training
 from enhsim_tf.enhancer.names import RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.paper.degraded import MODES, degrade
@@ -107,7 +107,7 @@ class DegradedModes:
         starts = coarse.shape[1] * np.arange(len(coarse))  # windows of one configuration are neighbours, and stay in one block
 
         def learnt_on_faults(name: str) -> Estimate:
-            enhancer = fit_enhancer(name, coarse[:, :, None], target[:, :, None], starts, self.settings.seed)
+            enhancer = Training(coarse[:, :, None], target[:, :, None], starts).fit(name, self.settings.seed)
             return lambda windows: enhancer.predict(windows[:, :, None])[:, :, 0]
 
         return {

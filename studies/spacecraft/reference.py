@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.detection.detectors import ResidualSize
+from enhsim_tf.detection.detectors import following_drift
 from enhsim_tf.detection.registry import RESIDUAL
 from enhsim_tf.paper.telemetry import cut_windows
 from studies.common.settings import Settings
@@ -45,8 +45,8 @@ def reference_rows(
         scorer = Scorer(simulator, ScoreOptions(RESIDUAL, number, settings.spacecraft.false_alarm_rate, seed))
         sizes = [scorer.score_windows(windows[:, :, None]) for windows in (judge.windows, windows_of(series), windows_of(train))]
         for ending, bound in BOUNDS.items():
-            detector = ResidualSize(bound).fit_sizes(np.array([scorer.detector.typical]))
-            rows.append({"training": REFERENCE, "detector": name + ending} | judge.judge(*map(detector.score_sizes, sizes)))
+            followed = [following_drift(each, scorer.typical_size, bound) for each in sizes]
+            rows.append({"training": REFERENCE, "detector": name + ending} | judge.judge(*followed))
     starts = np.arange(0, len(train) - window + 1, step)
     late = starts[starts >= len(train) // 3]  # the first windows have hardly any before them
     before = left_discord(train, late, window)

@@ -49,7 +49,7 @@ def generators(
     }
 
     def enhanced(noise: Any, seed: int) -> np.ndarray:
-        return simulator.generate_clean(number, seed=seed)[:, :, 0] + noise.generate(number, np.random.default_rng(seed))
+        return simulator.generate(number, seed=seed, with_noise=False)[:, :, 0] + noise.generate(number, np.random.default_rng(seed))
 
     return {f"enhanced + {name}": functools.partial(enhanced, noise) for name, noise in noises.items()} | {
         "ridge + residual windows": lambda seed: ridge.generate(number, seed=seed)[:, :, 0]

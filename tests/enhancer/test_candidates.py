@@ -6,7 +6,7 @@ import pytest
 from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer import candidates
-from enhsim_tf.enhancer.candidates import block_edges, choose_enhancer, fit_enhancer, judge, split_fold
+from enhsim_tf.enhancer.candidates import Training, block_edges, choose_enhancer, judge, split_fold
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
@@ -64,7 +64,7 @@ def test_the_coarse_candidate_returns_the_most_similar_column_of_each_channel_un
     coarse = series() * [1.0, 3.0] + [5.0, -40.0]
     target = coarse[:, ::-1] * [2.0, -1.0] + noise((len(coarse), 2), 0.1)
     inputs, targets, starts = windows_of(coarse, target)
-    found = fit_enhancer(COARSE, inputs, targets, starts)
+    found = Training(inputs, targets, starts).fit(COARSE)
     np.testing.assert_allclose(found.predict(inputs), inputs[:, :, ::-1], rtol=1e-4, atol=1e-4)
 
 
@@ -72,7 +72,7 @@ def test_level_and_gain_are_those_of_least_squares():
     coarse = series()
     target = np.stack([7 - 0.5 * coarse[:, 0], 3 * coarse[:, 1] - 1], axis=1) + noise((len(coarse), 2), 0.05)
     inputs, targets, starts = windows_of(coarse, target)
-    predicted = fit_enhancer(LEVEL_AND_GAIN, inputs, targets, starts).predict(inputs)
+    predicted = Training(inputs, targets, starts).fit(LEVEL_AND_GAIN).predict(inputs)
     for channel in range(2):
         gain, level = np.polyfit(inputs[:, :, channel].ravel(), targets[:, :, channel].ravel(), 1)
         np.testing.assert_allclose(predicted[:, :, channel], level + gain * inputs[:, :, channel], atol=1e-4)
@@ -82,7 +82,7 @@ def test_level_and_gain_are_those_of_least_squares():
 def test_the_papers_network_takes_all_columns_and_learns():
     coarse = series(width=60)
     inputs, targets, starts = windows_of(coarse, np.stack([coarse[:, 0] + coarse[:, 1], 5 - 9 * coarse[:, 0]], axis=1))
-    found = fit_enhancer(NETWORK, inputs, targets, starts, epochs=6)
+    found = Training(inputs, targets, starts).fit(NETWORK, epochs=6)
     errors = np.sqrt(np.mean((found.predict(inputs) - targets) ** 2, axis=(0, 1)))
     assert (errors < 0.4 * targets.std(axis=(0, 1))).all()  # of the first channel, one coarse column alone leaves 0.7
 
@@ -90,7 +90,7 @@ def test_the_papers_network_takes_all_columns_and_learns():
 def test_random_features_are_ridge_regression_on_a_hidden_layer_of_relu():
     coarse = series(800)
     inputs, targets, starts = windows_of(coarse, np.stack([coarse[:, 0] ** 2, 4 * np.abs(coarse[:, 1])], axis=1), 60)
-    alone, both = (fit_enhancer(name, inputs, targets, starts) for name in (RIDGE, RIDGE_AND_FEATURES))
+    alone, both = (Training(inputs, targets, starts).fit(name) for name in (RIDGE, RIDGE_AND_FEATURES))
     (kernel, shift), (weights, _) = both.layers
     assert kernel.shape == (2 * WINDOW, 1_000) and weights.shape == (1_000, 2 * WINDOW)
     hidden = np.maximum((inputs - both.centre).reshape(len(inputs), -1) @ kernel + shift, 0)[:, None, :]
@@ -183,7 +183,7 @@ def test_a_training_that_diverges_is_refused(refused, monkeypatch):
         candidates, "_train", lambda rows, *rest: [(np.full((32, 8), np.nan), np.zeros(8)), (np.ones((8, 16)), np.zeros(16))]
     )
     with refused("diverged", "--enhancer ridge"):
-        fit_enhancer(NETWORK, *windows_of(series(), series()[:, 0]))
+        Training(*windows_of(series(), series()[:, 0])).fit(NETWORK)
 
 
 # runs from overlapping windows

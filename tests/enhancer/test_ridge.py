@@ -101,9 +101,3 @@ def test_windows_may_overlap_and_come_in_any_order():
     order = np.random.default_rng(3).permutation(120)
     first, second = fit_ridge(inputs, targets, starts), fit_ridge(inputs[order], targets[order], starts[order])
     assert first.penalty == second.penalty > fit_ridge(inputs[order], targets[order]).penalty
-
-
-def test_other_numbers_of_windows_and_targets_are_refused(refused):
-    inputs, targets, _ = _linear(10)
-    with refused("one start per window", "(10, 12, 2), (9, 7)"):
-        fit_ridge(inputs, targets[:9])

@@ -51,12 +51,6 @@ def test_a_mean_stays_constant_across_seams():
     np.testing.assert_allclose(WindowBootstrap(np.full((5, 400), 3.0)).generate_series(2_000, default_rng(0)), 3.0, rtol=1e-6)
 
 
-@pytest.mark.parametrize("windows", [np.zeros((0, 40)), np.zeros(40), np.full((2, 40), np.nan), np.zeros((3, 2))])
-def test_unusable_windows_are_refused(refused, windows):
-    with refused("windows of noise"):
-        WindowBootstrap(windows)
-
-
 def sines(num_windows, window, seed=0, period=40):
     """Windows of a sine that begin at random phases."""
     begins = default_rng(seed).integers(0, period, num_windows)
@@ -110,8 +104,6 @@ def test_a_signal_of_another_shape_is_refused(refused):
         lambda: noise.generate(3, default_rng(0)),
         lambda: noise.generate(3, default_rng(0), sines(4, 40)),
         lambda: noise.generate_series(90, default_rng(0), np.zeros(80)),
-        lambda: WindowBootstrap(ar1(30, 40), np.zeros((29, 40))),
-        lambda: noise.generate(30, default_rng(0), np.full((30, 40), np.nan)),
     ):
         with refused("signal"):
             draw()

@@ -22,12 +22,19 @@ def test_the_waveform_below_the_noise_is_recovered(single):
 
 def test_each_channel_keeps_its_phase_level_and_scale(both):
     simulator, report = both
-    clean = simulator.generate_clean(400, seed=0)
+    clean = simulator.generate(400, seed=0, with_noise=False)
     assert clean.mean(axis=(0, 1)) == pytest.approx([5, 100], rel=0.02)
     assert np.std(clean, axis=(0, 1)) == pytest.approx(np.std(smooth_wave(4_000)) * np.array([2, 30]), rel=0.05)
     real = np.corrcoef(smooth_wave(4_000), -smooth_wave(4_000, 0.25))[0, 1]
     assert np.corrcoef(clean.reshape(-1, 2).T)[0, 1] == pytest.approx(real, abs=0.05)
     assert report.cross_correlation["apart"] < 0.1
+
+
+@pytest.mark.parametrize("coarse", [None, coarse_run()])
+def test_nominal_telemetry_keeps_a_piece_that_only_the_split_makes_shorter_than_a_window(coarse):
+    whole = series()
+    simulator, _ = fit([whole.part(0, 2_340), whole.part(2_340, 3_000)], coarse, QUICK)  # 2,400 samples are not held out
+    assert len(simulator.nominal) == 3_000 and (coarse is None or len(simulator.nominal_run) == 3_000)
 
 
 def test_a_delay_between_run_and_telemetry_is_recovered():
@@ -81,11 +88,11 @@ def test_the_noise_that_is_asked_for_is_used(name):
     ("words", "telemetry", "others"),
     [
         ("constant 1", Telemetry(np.ones(1_000, np.float32)), {}),
-        ("at least 256 samples, 8 windows of 32. Received: 200 of volts", series(200), {}),
+        ("at least 256 samples .*, 8 windows of 32. Received: 200 samples of volts", series(200), {}),
         ("at least one channel", {}, {}),
         ("2 groups", {"a": series(), "b": Telemetry(series().values, 1.0, 0.0, series().start)}, {}),
         ("overlaps the telemetry", series(), {"coarse": coarse_run(start="2031-01-01T00:00:00+00:00")}),
-        ("8 windows of 500 .* 2,400 samples of volts that are not held out", series(), {"options": FitOptions(window=500)}),
+        ("8 windows of 500. Received: 2,400 samples of volts that are not held out", series(), {"options": FitOptions(window=500)}),
     ],
 )
 def test_telemetry_that_cannot_be_fitted_is_refused(words, telemetry, others):

@@ -95,7 +95,7 @@ def test_generated_noise_keeps_the_relations_of_the_channels(fitted):
         return relations(windows - clean, clean)
 
     true = real(1_000, 20 * NUM_SAMPLES)  # of very much real noise; the floor is that of as much as the fit had
-    clean = simulator.generate_clean(2_000, seed=1)
+    clean = simulator.generate(2_000, seed=1, with_noise=False)
     apart = np.abs(relations(simulator.draw_noise(clean, np.random.default_rng(4)), clean) - true)
     floors = [np.abs(real(seed) - true) for seed in range(10, 18)]
     noise, levels = (apart[some].max() / np.mean([each[some].max() for each in floors]) for some in (slice(0, -3), slice(-3, None)))

@@ -9,7 +9,7 @@ import pytest
 from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
-from enhsim_tf.enhancer.candidates import fit_enhancer
+from enhsim_tf.enhancer.candidates import Training
 from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.noise.names import NOISES
 from enhsim_tf.noise.window_bootstrap import fit_noise
@@ -40,7 +40,7 @@ def test_a_saved_noise_model_generates_the_same_noise(name):
 
 @pytest.mark.parametrize("name", [COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_FEATURES])
 def test_a_saved_enhancer_predicts_the_same(name):
-    enhancer = fit_enhancer(name, CLEAN + WINDOWS, WINDOWS**2, 40 * np.arange(30))
+    enhancer = Training(CLEAN + WINDOWS, WINDOWS**2, 40 * np.arange(30)).fit(name)
     made = again(enhancer)
     assert (made.name, made.window, made.columns, made.channels) == (name, 40, 2, 2)
     np.testing.assert_array_equal(made.predict(CLEAN), enhancer.predict(CLEAN))
