@@ -17,7 +17,7 @@ _PLACES = {
     "FitOptions": "simulator.options",
     "FmuSimulator": "coarse_simulator.fmu",
     "FunctionSimulator": "coarse_simulator.interface",
-    "InjectOptions": "datasets.inject_options",
+    "InjectOptions": "datasets.places",
     "InputError": "common.errors",
     "Recording": "coarse_simulator.recording",
     "ScoreOptions": "simulator.options",

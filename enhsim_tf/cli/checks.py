@@ -55,8 +55,7 @@ def _check_update(options: argparse.Namespace) -> None:
 
 
 def _check_inject(options: argparse.Namespace) -> None:
-    from enhsim_tf.datasets.inject_options import INJECTIONS, WITHOUT_SEVERITY, InjectOptions
-    from enhsim_tf.datasets.places import split_limits
+    from enhsim_tf.datasets.places import INJECTIONS, WITHOUT_SEVERITY, InjectOptions, split_limits
 
     kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
     least, greatest = split_limits("severity", options.severity or "4")

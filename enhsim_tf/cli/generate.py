@@ -13,9 +13,8 @@ from enhsim_tf.datasets.generate import generate_data_set
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
 from enhsim_tf.datasets.labelled_series import draw_schedule, series_index, series_labelled
+from enhsim_tf.datasets.labelled_windows import make_plan, write_windows
 from enhsim_tf.datasets.places import length_limits, parse_num_samples
-from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.datasets.shard import write_windows
 from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange

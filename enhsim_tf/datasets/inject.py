@@ -13,9 +13,8 @@ import pandas as pd
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.inject_options import WITHOUT_SEVERITY, InjectOptions, checked_place
 from enhsim_tf.datasets.label_columns import series_table
-from enhsim_tf.datasets.places import draw_between, length_limits
+from enhsim_tf.datasets.places import WITHOUT_SEVERITY, InjectOptions, checked_place, draw_between, length_limits
 from enhsim_tf.detection.anomalies import INJECTIONS, estimate_noise_sd
 from enhsim_tf.simulator.joint import telemetry_of
 from enhsim_tf.telemetry.placing import PlacedEvent, draw_begin, in_order, place_events

@@ -8,8 +8,8 @@ import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.datasets.inject import inject, join_injected
-from enhsim_tf.datasets.inject_options import JOINT_KINDS, InjectOptions
 from enhsim_tf.datasets.label_columns import LABELS, series_table, write_table
+from enhsim_tf.datasets.places import JOINT_KINDS, InjectOptions
 from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.placing import draw_begin
