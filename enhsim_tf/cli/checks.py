@@ -65,10 +65,8 @@ def _check_inject(options: argparse.Namespace) -> None:
         raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
     length = split_limits("length", options.length)
     options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed)
-    if options.chosen.is_joint:
-        _refuse(options, f"with {kinds[0]}, which has drawn places and the estimated noise", "at", "noise_sd")
-        if set(kinds) <= set(WITHOUT_SEVERITY):
-            _refuse(options, f"with {', '.join(kinds)}: of the kinds of several channels, common_shift alone has one", "severity")
+    if set(kinds) <= set(WITHOUT_SEVERITY) and not options.at:
+        _refuse(options, f"with {options.kinds}: of the kinds of several channels, common_shift alone has one", "severity")
     options.cleaning = cleaning_options(options, 3)
 
 

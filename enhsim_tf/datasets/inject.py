@@ -6,7 +6,7 @@ how channels move together, and one is a fault that acts on all of them.
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,7 @@ from enhsim_tf.telemetry.series import Telemetry, index_of
 
 
 def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -> pd.DataFrame:
-    """Injects anomalies into nominal telemetry: into one channel, or, if kinds are among `JOINT_KINDS`, into several.
+    """Injects anomalies into nominal telemetry: into one channel, or into several, of which each anomaly changes one or, of some kinds, all.
 
     Args:
         telemetry: Several channels, as `join_channels` returns them, or the parts of one channel, as `clean` returns them.
@@ -46,12 +46,12 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
     nominal, index = telemetry.values.astype(np.float32), index_of(telemetry_of(telemetry))
     series = [[part.values[:, channel] for part in telemetry.parts] for channel in range(len(names))]
     noise_sd = np.array([options.noise_sd or estimate_noise_sd(parts) for parts in series])
-    if not options.is_joint and not noise_sd[0] > 0:
+    if len(names) == 1 and not noise_sd[0] > 0:
         raise InputError(
             f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {names[0]}, in which every "
             "second difference is zero. Give the standard deviation with --noise-sd."
         )
-    rng = np.random.default_rng([options.seed, *([61] if options.is_joint else names[0].encode())])
+    rng = np.random.default_rng([options.seed, *([61] if len(names) > 1 else names[0].encode())])
     shortest, longest = length_limits(options.length, interval_s)
     drawn = [
         (kind, 1.0 if kind in WITHOUT_SEVERITY else draw_between(options.severity, rng), int(rng.integers(shortest, longest + 1)))
@@ -114,18 +114,3 @@ def _changed(
     weights, *_ = np.linalg.lstsq(centred, nominal[:, channel] - nominal[:, channel].mean(dtype=np.float64), rcond=None)
     follows = centred @ weights
     return nominal[here, channel] - follows[here] + follows[away]
-
-
-def join_injected(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Joins the tables of several channels to one with their values and `mask`, which marks what is changed in any of them."""
-    (first, frame), *others = frames.items()
-    for name, other in others:
-        if not other.index.equals(frame.index):
-            raise InputError(
-                f"Expected channels with the same times for one TimeEval file. Received: {first!r} with {len(frame):,} and {name!r} with "
-                f"{len(other):,} samples, or other times. Give a folder as --out, which gets one file per channel."
-            )
-    values = {name: each["value"] for name, each in frames.items()}
-    joined = pd.DataFrame(values | {"mask": np.any([each["mask"] for each in frames.values()], axis=0)}, index=frame.index)
-    joined.attrs = frame.attrs | {"anomalies": [anomaly for each in frames.values() for anomaly in each.attrs["anomalies"]]}
-    return joined
