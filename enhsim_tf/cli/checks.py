@@ -71,12 +71,11 @@ def _check_inject(options: argparse.Namespace) -> None:
 
 
 def _check_generate(options: argparse.Namespace) -> None:
-    options.cleaning = cleaning_options(options, 2)
+    options.cleaning, options.is_large = cleaning_options(options, 2), bool(options.workers or options.engine)
     if options.coarse is not None:
         _refuse(options, "with --coarse, because the run gives length, times and labels", *_NOT_OF_RUNS)
         return
     _refuse(options, "without --coarse", *_OF_RUNS)
-    options.is_large = bool(options.workers or options.engine)
     if options.continuous is None:
         _refuse(options, "without --continuous", "start", "at", "number", "timeeval")
         if options.windows is None:
