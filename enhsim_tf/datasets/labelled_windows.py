@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.label_columns import NOMINAL, parquet_options, window_schema, window_table
+from enhsim_tf.datasets.label_columns import NOMINAL, window_table
 from enhsim_tf.datasets.places import ScenarioRange
 from enhsim_tf.simulator.model_folder import MANIFEST
 from enhsim_tf.simulator.simulator import EnhancedSimulator
@@ -155,8 +155,12 @@ def write_windows(path: str | os.PathLike, plan: Plan, simulator: EnhancedSimula
         shards: Numbers of the shards. None: all of them, one after the other.
     """
     about = {"format": FORMAT, _KEY: plan_key(plan.settings()), "interval_s": repr(plan.interval_s), "channel": ", ".join(plan.channels)}
-    schema = window_schema(plan.window, plan.channels).with_metadata(about)
-    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **parquet_options(schema)) as writer:
+    none = np.zeros((0, plan.window, len(plan.channels)), np.float32)
+    schema = window_table(none, none > 0, plan.channels, [], []).schema.with_metadata(about)
+    # bytes of equal significance are stored together: signs and exponents compress well, noisy mantissas do not
+    encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in schema.names if name.startswith("window")}
+    options = {"compression": "zstd", "use_dictionary": ["scenario"], "column_encoding": encoding, "write_statistics": ["scenario"]}
+    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
         for shard in range(plan.num_shards) if shards is None else shards:
             (seed,) = np.random.SeedSequence([_STREAM, plan.seed, shard, 1]).generate_state(1, np.uint64).tolist()
             scenarios, first = draw_scenarios(plan, shard), 0
