@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import series_table
 from enhsim_tf.datasets.places import WITHOUT_SEVERITY, InjectOptions, checked_place, draw_between, length_limits
 from enhsim_tf.detection.anomalies import INJECTIONS, estimate_noise_sd
-from enhsim_tf.simulator.joint import telemetry_of
+from enhsim_tf.simulator.joint import join_channels, telemetry_of
 from enhsim_tf.telemetry.placing import PlacedEvent, draw_begin, in_order, place_events
 from enhsim_tf.telemetry.series import Telemetry, index_of
 
@@ -38,8 +38,7 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
         InputError: If anomalies overlap, do not fit or change no sample, or if the noise of the channel cannot be estimated.
     """
     if not isinstance(telemetry, Recording):
-        runs, first = tuple(Run(part.values[:, None], part.offset_s) for part in telemetry), telemetry[0]
-        telemetry = Recording(runs, (first.name,), first.interval_s, first.start, first.name)
+        (telemetry,) = join_channels({telemetry[0].name: telemetry})
     kinds, names, interval_s = options.kinds, telemetry.columns, telemetry.interval_s
     if options.is_joint and len(names) < 2:
         raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
@@ -67,7 +66,7 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
     def changes(event: PlacedEvent) -> bool:
         """Puts an anomaly into the series; whether it has changed a sample."""
         here, channel = slice(event.begin, event.end), int(rng.integers(len(names)))
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             if event.kind == "common_shift":
                 values[here] = nominal[here] + (event.severity * noise_sd).astype(np.float32)
             else:

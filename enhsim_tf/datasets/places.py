@@ -197,7 +197,7 @@ class InjectOptions:
         at: Anomalies at given places, `KIND[:SEVERITY]@BEGIN/LENGTH`. BEGIN is a sample number or a time. The severity is drawn if it
             is not given.
         noise_sd: Standard deviation of the noise, in the unit of the channel. None: `anomalies.estimate_noise_sd`.
-        seed: Random seed. Each channel draws from its own generator, which depends on the seed and the name of the channel.
+        seed: Random seed. A channel on its own draws from a generator that depends on the seed and the name of the channel.
 
     Raises:
         InputError: If a kind is unknown, a number is out of range, or options contradict each other.
