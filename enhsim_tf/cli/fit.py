@@ -81,9 +81,7 @@ def fit_channels(
     """
     out = Path(os.path.abspath(options.out))
     if (out / MANIFEST).is_file():
-        raise InputError(
-            f"Expected a folder for models. Received: {options.out}, which is a model itself. Give another --out, or its parent folder."
-        )
+        raise InputError(f"Expected a folder for models. Received: {options.out}, which is a model itself. Give another --out.")
     groups = [{name: each} for name, each in series.items()] if options.separately else [dict(series)]
     for name in (*map(_name, groups), *series):
         refuse_foreign(folder_of(out, name))

@@ -142,11 +142,7 @@ def write_manifest(folder: Path, plan: Plan, checksums: Mapping[int, str] | None
 
 
 def find_problems(folder: str | os.PathLike) -> Iterator[str]:
-    """Verifies a data set against its manifest and yields one line for each problem.
-
-    Raises:
-        InputError: If the folder is not a data set, or if its manifest is damaged.
-    """
+    """Verifies a data set and yields a line for each problem; raises InputError if there is no manifest, or a damaged one."""
     folder = Path(folder)
     manifest = read_manifest(folder)
     shards, there = manifest["shards"], {path.name for path in folder.iterdir() if _SHARD.fullmatch(path.name) and path.is_file()}

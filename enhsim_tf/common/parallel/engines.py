@@ -25,9 +25,6 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
             that memory does not grow with their number.
         workers: Number of processes. None: one per CPU.
 
-    Yields:
-        The result of `work` for each item.
-
     Raises:
         InputError: If `work` raises one, if the engine cannot be used, or if its processes keep dying (`ProcessesDiedError`).
     """
