@@ -101,7 +101,8 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None) -> Chan
     if columns is None and array.shape[1] > MAX_COLUMNS:
         raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
     known, last, found = {str(number): number for number in range(array.shape[1])}, array.shape[1] - 1, {}
-    has_commands = columns in (None, ["0"]) and _has_commands(array)
+    has_layout = array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array) > 0
+    has_commands = columns in (None, ["0"]) and has_layout and np.isin(array[:, 1:], (0, 1)).all()
     for column in ["0"] if has_commands else columns or known:
         if column not in known:
             raise InputError(f"Expected a column of {path.name}, a number from 0 to {last}. Received: {column!r}. Name one of these.")
@@ -111,9 +112,3 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None) -> Chan
             text = f"columns 1 to {last} hold only 0 and 1 and were taken as commands, not as channels: {last}"
             found[name].attrs["findings"] = [dataclasses.asdict(Finding("commands", last, text))]
     return Channels(found, commands=array[:, 1:].astype(np.float32) if has_commands else None)
-
-
-def _has_commands(array: np.ndarray) -> bool:
-    """Whether an array has the published layout: 25 or 55 columns, of which all after the first hold only zeros and ones."""
-    has_layout = array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array)
-    return bool(has_layout) and bool(np.isin(array[:, 1:], (0, 1)).all())
