@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import replace_file, sha256
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.datasets.label_columns import NOMINAL, window_table
 from enhsim_tf.datasets.places import ScenarioRange
 from enhsim_tf.simulator.model_folder import MANIFEST
@@ -56,7 +56,7 @@ class Plan:
             raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: --windows {self.num_windows}.")
         if self.nominal_share < 1 and round(self.num_windows * self.shares[-1], 6) < 1:
             raise InputError(
-                f"Expected at least one window for each of {len(self.scenarios)} scenarios. Received: {self.num_windows} windows, of which a "
+                f"Expected at least one window for each of {len(self.scenarios)} scenarios. Received: {counted(self.num_windows, 'window')}, of which a "
                 f"share of {self.nominal_share:g} is nominal. Ask for more windows."
             )
 
