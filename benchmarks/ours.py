@@ -8,8 +8,7 @@ import numpy as np
 from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.backend import tf
-from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.datasets.shard import write_windows
+from enhsim_tf.datasets.labelled_windows import make_plan, write_windows
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap

@@ -17,7 +17,7 @@ _PLACES = {
     "FitOptions": "simulator.options",
     "FmuSimulator": "coarse_simulator.fmu",
     "FunctionSimulator": "coarse_simulator.interface",
-    "InjectOptions": "datasets.inject_options",
+    "InjectOptions": "datasets.places",
     "InputError": "common.errors",
     "Recording": "coarse_simulator.recording",
     "ScoreOptions": "simulator.options",
@@ -37,7 +37,7 @@ _PLACES = {
     "record": "coarse_simulator.recording",
     "score": "simulator.scoring",
     "series_labelled": "datasets.labelled_series",
-    "to_series": "telemetry.pandas_series",
+    "to_series": "telemetry.series",
     "update": "simulator.updating",
 }
 __all__ = list(_PLACES)

@@ -1,6 +1,5 @@
 """The paper's pipeline on a channel of one's own: `python -m enhsim_tf.reproduce --telemetry`."""
 
-import os
 import zlib
 from pathlib import Path
 from typing import Any
@@ -81,8 +80,6 @@ class OwnChannel(Pipeline):
 
 def _clean(path: Path, column: str | None, time: str | None) -> Cleaned:
     """Reads and cleans the channel; raises an `InputError` if there are several, or if it has several parts or is constant."""
-    if not os.path.isfile(path):
-        raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is not a file. Check the path.")
     cleaning = Cleaning(time_format="s")
     channels = read_source(path, None if column is None else [column], NO_TIME if time is None else time, cleaning)
     if len(channels) > 1:

@@ -16,9 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate  # noqa: E402
+from enhsim_tf.datasets.labelled_windows import Plan, ShardMaker  # noqa: E402
 from enhsim_tf.datasets.places import ScenarioRange  # noqa: E402
-from enhsim_tf.datasets.plan import Plan  # noqa: E402
-from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
 from tests.known_simulators import of_waves  # noqa: E402
 
 COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])

@@ -183,7 +183,7 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
     inject.add_argument("--noise-sd", type=float, metavar="SD", help=noise)
     _add_events(inject, "anomaly", "KIND", "ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h")
     inject.add_argument("--figure", action="store_true", help="draw the changed channels, with the anomalies, beside OUT, as .png")
-    inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder for several channels")
+    inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder: a file per channel")
     _add_seed(inject)
 
 

@@ -55,8 +55,7 @@ def _check_update(options: argparse.Namespace) -> None:
 
 
 def _check_inject(options: argparse.Namespace) -> None:
-    from enhsim_tf.datasets.inject_options import INJECTIONS, WITHOUT_SEVERITY, InjectOptions
-    from enhsim_tf.datasets.places import split_limits
+    from enhsim_tf.datasets.places import INJECTIONS, WITHOUT_SEVERITY, InjectOptions, split_limits
 
     kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
     least, greatest = split_limits("severity", options.severity or "4")
@@ -66,20 +65,17 @@ def _check_inject(options: argparse.Namespace) -> None:
         raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
     length = split_limits("length", options.length)
     options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed)
-    if options.chosen.is_joint:
-        _refuse(options, f"with {kinds[0]}, which has drawn places and the estimated noise", "at", "noise_sd")
-        if set(kinds) <= set(WITHOUT_SEVERITY):
-            _refuse(options, f"with {', '.join(kinds)}: of the kinds of several channels, common_shift alone has one", "severity")
+    if set(kinds) <= set(WITHOUT_SEVERITY) and not options.at:
+        _refuse(options, f"with {options.kinds}: of the kinds of several channels, common_shift alone has one", "severity")
     options.cleaning = cleaning_options(options, 3)
 
 
 def _check_generate(options: argparse.Namespace) -> None:
-    options.cleaning = cleaning_options(options, 2)
+    options.cleaning, options.is_large = cleaning_options(options, 2), bool(options.workers or options.engine)
     if options.coarse is not None:
         _refuse(options, "with --coarse, because the run gives length, times and labels", *_NOT_OF_RUNS)
         return
     _refuse(options, "without --coarse", *_OF_RUNS)
-    options.is_large = bool(options.workers or options.engine)
     if options.continuous is None:
         _refuse(options, "without --continuous", "start", "at", "number", "timeeval")
         if options.windows is None:

@@ -69,27 +69,19 @@ def fit_channels(
     read_run: Callable[..., Recording] | None = None,
     commands: np.ndarray | None = None,
 ) -> tuple[dict[str, dict], dict[str, str]]:
-    """Fits simulators to channels and saves them together with their reports. Engine and number of workers do not change the results.
+    """Fits simulators to channels and saves them with their reports. Engine and number of workers do not change the results.
 
-    Args:
-        series: Raw values of each channel, by the channel's name.
-        options: Options of the command.
-        say: Function that is called with each line of output.
-        read_run: Reads the run of a coarse simulator, with the argument `interval_s` of `read_recording`; None if there is none.
-        commands: Commands of the samples of a single channel, shape `(samples, commands)`, or None.
+    `say` is called with each line of output. `read_run`, None if there is no run, is called with the `interval_s` of `read_recording`.
 
     Returns:
         The reports by the names of their channels, and for each channel that could not be fitted the reason.
 
     Raises:
-        InputError: Before any fit, if a channel's name cannot be used for a folder or an output folder contains something other
-            than a saved simulator. Also if the engine is not available.
+        InputError: Before any fit, if a name or an output folder cannot be used, or if the engine is not available.
     """
     out = Path(os.path.abspath(options.out))
     if (out / MANIFEST).is_file():
-        raise InputError(
-            f"Expected a folder for models. Received: {options.out}, which is a model itself. Give another --out, or its parent folder."
-        )
+        raise InputError(f"Expected a folder for models. Received: {options.out}, which is a model itself. Give another --out.")
     groups = [{name: each} for name, each in series.items()] if options.separately else [dict(series)]
     for name in (*map(_name, groups), *series):
         refuse_foreign(folder_of(out, name))

@@ -13,9 +13,8 @@ from enhsim_tf.datasets.generate import generate_data_set
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
 from enhsim_tf.datasets.labelled_series import draw_schedule, series_index, series_labelled
+from enhsim_tf.datasets.labelled_windows import make_plan, write_windows
 from enhsim_tf.datasets.places import length_limits, parse_num_samples
-from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.datasets.shard import write_windows
 from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
@@ -24,18 +23,19 @@ from enhsim_tf.telemetry.placing import PlacedEvent
 
 def run_generate(options: argparse.Namespace) -> int:
     """Generates labelled training data with the simulator of each channel and returns the exit code."""
-    if options.coarse is not None:
-        return _generate_copies(options)
     is_series, models = options.continuous is not None, chosen_of(models_of(options.models), options.channel)
     if options.is_large:
         paths = {name: options.out if len(models) == 1 else folder_of(options.out, name) for name in models}
     else:
         suffixes = (".csv",) if options.timeeval else (".parquet", ".csv") if is_series else (".parquet",)
         paths = output_paths(options.out, models, suffixes)
+    refuse_same_file(paths.values(), options.coarse or ())
 
     def generate(name: str) -> None:
         simulator = EnhancedSimulator.load(models[name])
-        if is_series:
+        if options.coarse is not None:
+            what = _write_copies(options, name, simulator, paths[name])
+        elif is_series:
             what = _write_series(options, simulator, paths[name])
         else:
             plan = make_plan(simulator, models[name], options.scenario, options.nominal_share, options.windows, options.seed)
@@ -72,23 +72,14 @@ def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, pat
     return what
 
 
-def _generate_copies(options: argparse.Namespace) -> int:
-    """Generates copies of a recorded run of the user's own simulator with each model."""
-    copies = 1 if options.copies is None else options.copies
-    models = chosen_of(models_of(options.models), options.channel)
-    paths = output_paths(options.out, models, (".parquet",))
-    refuse_same_file(paths.values(), options.coarse)
-
-    def write(name: str) -> None:
-        model = EnhancedSimulator.load(models[name])
-        runs = model.recorded_runs()
-        run = read_recording(options.coarse, runs.columns, options.coarse_time, options.cleaning, model.interval_s, options.coarse_start)
-        num_rows = write_copies(paths[name], model, run, copies, options.seed)
-        lines = [*run.notes, *coverage_lines(model, run)]
-        if runs.delay_s:
-            lines.append(f"times are those of the telemetry, {runs.delay_s:g} s after those of the run")
-        samples = counted(num_rows // copies, "sample")
-        for line in [*lines, f"{counted(copies, 'copy')} of {samples}, one every {model.interval_s:g} s, in {paths[name]}"]:
-            tell(f"{printable(name)}: {line}")
-
-    return for_each(models, write)
+def _write_copies(options: argparse.Namespace, name: str, model: EnhancedSimulator, path: Path) -> str:
+    """Writes copies of a recorded run of the user's own simulator and returns what is said of them."""
+    copies, runs = 1 if options.copies is None else options.copies, model.recorded_runs()
+    run = read_recording(options.coarse, runs.columns, options.coarse_time, options.cleaning, model.interval_s, options.coarse_start)
+    num_rows = write_copies(path, model, run, copies, options.seed)
+    lines = [*run.notes, *coverage_lines(model, run)]
+    if runs.delay_s:
+        lines.append(f"times are those of the telemetry, {runs.delay_s:g} s after those of the run")
+    for line in lines:
+        tell(f"{printable(name)}: {line}")
+    return f"{counted(copies, 'copy')} of {counted(num_rows // copies, 'sample')}, one every {model.interval_s:g} s,"

@@ -95,13 +95,13 @@ def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict
 
 
 def cleaned_channels(series: Mapping[str, pd.Series], names: Mapping[str, str], cleaning: Cleaning) -> tuple[Recording, dict[str, Cleaned]]:
-    """Cleans the channels of a model, whose names in the source are given, brings them onto one clock, and returns what was cleaned."""
+    """Cleans channels, whose names in the source are given, brings them onto one clock, and returns what was cleaned."""
     cleaned = {channel: clean(series[name], cleaning) for channel, name in names.items()}
     joined = join_channels({channel: each.parts for channel, each in cleaned.items()})
     if len(joined) > 1:
         raise InputError(
-            f"Expected the channels {', '.join(names)[:120]} at the same times, because they were fitted together. Received: "
-            f"{len(joined)} groups without enough common time. Give telemetry of the same time."
+            f"Expected the channels {', '.join(names)[:120]} at the same times. Received: {len(joined)} groups without enough common time. "
+            "Give telemetry of the same time."
         )
     return joined[0], cleaned
 

@@ -55,21 +55,15 @@ def run_score(options: argparse.Namespace) -> int:
         if not options.json:
             notes = [f"{printable(model)}: {note}" for note in (run.notes if run is not None else ())]
             lines = lines_of([each.report for each in cleaned.values()])
-            tell("\n".join([*_warning(simulator), *lines, *notes, *_said(frame, simulator, paths[model])]))
+            if not found[source_names[model]]["keeps_promise"]:
+                flagged = f"{simulator.trained['false_alarms']:.0%} were flagged at 1 % set"
+                lines.insert(0, f"{spoken(simulator.channels)}: WARNING: on held-out nominal time {flagged}, so do not trust these alarms")
+            tell("\n".join([*lines, *notes, *_said(frame, simulator, paths[model])]))
 
     code = for_each(channels, write)
     if options.json:
         tell(json.dumps(found))
     return code
-
-
-def _warning(simulator: EnhancedSimulator) -> list[str]:
-    name, trained = spoken(simulator.channels), simulator.trained
-    if trained.get("keeps_promise", True):
-        return []
-    return [
-        f"{name}: WARNING: on held-out nominal time {trained['false_alarms']:.0%} were flagged at 1 % set, so do not trust these alarms"
-    ]
 
 
 def _said(frame: pd.DataFrame, simulator: EnhancedSimulator, path: Path) -> list[str]:

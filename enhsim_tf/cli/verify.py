@@ -4,7 +4,7 @@ import argparse
 
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import counted
-from enhsim_tf.datasets.folder import find_problems, num_shards, read_manifest
+from enhsim_tf.datasets.generate import find_problems, num_shards, read_manifest
 
 
 def run_verify(options: argparse.Namespace) -> int:

@@ -45,16 +45,13 @@ def pair_recordings(telemetry: Recording, run: Recording, delay_s: float = 0.0, 
                 begin_s = part.offset_s + interval_s * first
                 values.append(Run(part.values[first:stop], begin_s))
                 coarse.append(Run(there[first:stop], begin_s))
-    if not longest and run.clock().counts and not clocks[0].counts:
-        begin = iso_time(nanoseconds(clocks[0], 0, 1)[0]).removesuffix("+00:00")
-        raise InputError(
-            f"Expected a coarse run that overlaps the telemetry in time. Received: dates in {telemetry.name}, times that count from zero in "
-            f"{run.name}. Give the time of that zero: start (--coarse-start {begin} if the run begins with the telemetry)."
-        )
     if not longest:
+        spans, advice = (_span(telemetry, 0.0), _span(run, shift_s)), "Record the same time, or give --delay."
+        if run.clock().counts and not clocks[0].counts:
+            begin = iso_time(nanoseconds(clocks[0], 0, 1)[0]).removesuffix("+00:00")
+            spans, advice = ("dates", "times from zero"), f"Give the time of that zero: --coarse-start {begin} if both begin together."
         raise InputError(
-            f"Expected a coarse run that overlaps the telemetry in time. Received: {_span(telemetry, 0.0)} for {telemetry.name}, "
-            f"{_span(run, shift_s)} for {run.name}, in seconds after the telemetry's start. Record the same time, or give --delay."
+            f"Expected a coarse run that overlaps the telemetry in time. Received: {spans[0]} in {telemetry.name}, {spans[1]} in {run.name}. {advice}"
         )
     if not values:
         raise InputError(
@@ -67,7 +64,7 @@ def pair_recordings(telemetry: Recording, run: Recording, delay_s: float = 0.0, 
 
 def _span(recording: Recording, shift_s: float) -> str:
     last = recording.clock(recording.parts[-1]).time_s[-1]
-    return f"{recording.parts[0].offset_s + shift_s:.6g} to {last + shift_s:.6g}"
+    return f"{recording.parts[0].offset_s + shift_s:.6g} to {last + shift_s:.6g} s after the telemetry's start"
 
 
 def _seconds_between(telemetry: Telemetry, recording: Recording) -> float:

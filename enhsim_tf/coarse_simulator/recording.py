@@ -124,7 +124,7 @@ def record(
     start: str | None = None,
     labels: Mapping[str, Any] | None = None,
 ) -> Recording:
-    """Runs a simulator and records its output.
+    """Runs a simulator and returns a recording of its output.
 
     Args:
         simulator: The simulator.
@@ -134,9 +134,6 @@ def record(
         start: Zero of the time axis as ISO 8601 text, or None.
         labels: Values to carry to every sample, such as `{"scenario": "weak heater", "severity": 0.5}`; a value is one
             number or text, or an array with one element per sample.
-
-    Returns:
-        The recording.
 
     Raises:
         InputError: If the times are not regular, or the simulator returns something unusable.

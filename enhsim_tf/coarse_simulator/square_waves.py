@@ -81,11 +81,6 @@ class SquareWaveSimulator:
         """Lowest and highest level that the sum can reach."""
         return sum(min(wave.low, wave.high) for wave in self.waves), sum(max(wave.low, wave.high) for wave in self.waves)
 
-    @property
-    def shortest_period_s(self) -> float:
-        """The shortest period in seconds."""
-        return min(wave.period_s for wave in self.waves)
-
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """Evaluates the nominal sum at times in seconds; returns a float64 array of the same shape."""
         return sum(wave(time_s) for wave in self.waves)
@@ -96,8 +91,8 @@ class SquareWaveSimulator:
         if scenario is None or scenario.severity == 0:
             return self(time_s).astype(np.float32)
         rng, onset = np.random.default_rng(0) if rng is None else rng, scenario.first_sample(time_s.shape[1])
-        found = degrade(self, time_s, scenario.mode, scenario.severity, self.levels, self.shortest_period_s, rng, onset)
-        return found.astype(np.float32)
+        shortest_s = min(wave.period_s for wave in self.waves)
+        return degrade(self, time_s, scenario.mode, scenario.severity, self.levels, shortest_s, rng, onset).astype(np.float32)
 
     def run(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
         """Simulates one run, float32 of shape `(samples, 1)`, see `interface.CoarseSimulator.run`."""

@@ -1,22 +1,32 @@
-"""Generates large data sets with worker processes, and resumes them after an interruption.
+"""Generates large data sets with worker processes, resumes them after an interruption, and verifies them.
 
 The main process assigns numbers of shards to workers and records the checksums of finished shards. It neither holds windows nor loads networks.
 If the folder contains a part of the same data set, finished shards are kept and the others are generated. The bytes of the result do not
 depend on the engine, the number of workers or the number of interruptions.
+
+The folder has the shards, `_manifest.json`, and during generation `.lock`. The manifest contains the settings of the data set and, once it is
+finished, the checksum of each shard. Until then, a shard is finished if its file is there, because files are written atomically, and has the
+key of the plan and the right number of rows.
 """
 
 import contextlib
+import json
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
-from enhsim_tf.common.atomic_files import remove_leftovers
+import filelock
+
+from enhsim_tf.common.atomic_files import remove_leftovers, sha256, write_json
 from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel import engines
-from enhsim_tf.datasets.folder import MANIFEST, check_folder, locked, read_manifest, write_manifest
-from enhsim_tf.datasets.plan import Plan
-from enhsim_tf.datasets.shard import ShardMaker, finished_shards, shard_file
+from enhsim_tf.datasets.labelled_windows import FORMAT, Plan, ShardMaker, finished_shards, shard_file
+
+MANIFEST, _LOCK = "_manifest.json", ".lock"  # readers of Parquet folders skip such names
+_SHARD = re.compile(r"shard-(\d{6,})\.parquet")
 
 
 def generate_data_set(
@@ -64,3 +74,83 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
             done += plan.num_windows_in(shard)
             generated(done)
     write_manifest(out, plan, checksums)
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Creates a folder and locks it against other runs. The operating system releases the lock when this process ends for any reason."""
+    folder.mkdir(parents=True, exist_ok=True)
+    open(folder / _LOCK, "ab").close()  # no probe beside it: another run may be looking at what is there
+    lock = filelock.FileLock(folder / _LOCK, blocking=False, preserve_lock_file=True)  # or where there are no locks, a mark that stays
+    try:
+        lock.acquire()
+    except filelock.Timeout:
+        raise InputError(f"Expected a folder that no other run writes to. Received: {folder}. Wait for it, or name another.") from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def check_folder(folder: Path, plan: Plan) -> None:
+    """Checks, without changing it, that a folder is new, empty, or contains a finished or unfinished data set of the same plan."""
+    if not folder.is_dir():
+        return
+    others = sorted(path.name for path in folder.iterdir() if path.name != _LOCK and not path.name.startswith(f".{MANIFEST}."))
+    if MANIFEST not in others:
+        if others:
+            raise InputError(
+                f"Expected a new folder, or one of this data set. Received: {folder}, which contains {others[0]!r}. Give another."
+            )
+        return
+    kept = read_manifest(folder)["settings"]
+    for name, asked in plan.settings().items():
+        if kept.get(name) != asked:
+            was, now = (json.dumps(each)[:100] for each in (kept.get(name), asked))
+            raise InputError(f"Expected {name} as in the data set in {folder}: {was}. Received: {now}. Give another --out.")
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Reads and validates the manifest of a data set. Its `shards` are the checksums by the names of the files, None if it is not finished."""
+    if not os.path.isfile(folder / MANIFEST):
+        raise InputError(f"Expected a data set of `generate --workers`. Received: {folder}, which has no {MANIFEST}. Give another folder.")
+    try:
+        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        settings, shards = content["settings"], content["shards"]
+        if content["format"] != FORMAT or not min(settings["windows"], settings["shard"]) >= 1:
+            raise ValueError(f"format or settings of something else: {str(content['format'])[:80]}")
+        names = map(shard_file, range(num_shards(settings)))
+        if shards is not None and (len(shards) != num_shards(settings) or list(dict(shards)) != list(names)):
+            raise ValueError(f"{len(shards):,} other shards than the {num_shards(settings):,} of its settings")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"Expected a data set of `generate` of the format {FORMAT}. Received: {folder}, whose {MANIFEST} is damaged or another one "
+            f"({type(error).__name__}: {str(error)[:120]}). Give another folder, or remove this one and run `generate` again."
+        ) from None
+    return content
+
+
+def num_shards(settings: Mapping[str, int]) -> int:
+    """Returns the number of shards of a data set with these settings."""
+    return -(-settings["windows"] // settings["shard"])
+
+
+def write_manifest(folder: Path, plan: Plan, checksums: Mapping[int, str] | None = None) -> None:
+    """Writes the manifest of a data set, finished if the checksums of all its shards are given, by the number of the shard."""
+    shards = None if checksums is None else {shard_file(shard): checksums[shard] for shard in range(plan.num_shards)}
+    write_json(folder / MANIFEST, {"format": FORMAT, "settings": plan.settings(), "shards": shards})
+
+
+def find_problems(folder: str | os.PathLike) -> Iterator[str]:
+    """Verifies a data set and yields a line for each problem; raises InputError if there is no manifest, or a damaged one."""
+    folder = Path(folder)
+    manifest = read_manifest(folder)
+    shards, there = manifest["shards"], {path.name for path in folder.iterdir() if _SHARD.fullmatch(path.name) and path.is_file()}
+    if shards is None:
+        yield f"not finished: {len(there):,} of {num_shards(manifest['settings']):,} shards are there; run the same `generate` again"
+        return
+    for name, checksum in shards.items():
+        if name not in there or sha256(folder / name) != checksum:
+            yield f"{name}: missing, or its checksum differs from the recorded one"
+    for name in sorted(there - set(shards)):
+        yield f"{name}: not a file of this data set"

@@ -6,25 +6,23 @@ how channels move together, and one is a fault that acts on all of them.
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.inject_options import WITHOUT_SEVERITY, InjectOptions, checked_place
 from enhsim_tf.datasets.label_columns import series_table
-from enhsim_tf.datasets.places import draw_between, length_limits
+from enhsim_tf.datasets.places import WITHOUT_SEVERITY, InjectOptions, checked_place, draw_between, length_limits
 from enhsim_tf.detection.anomalies import INJECTIONS, estimate_noise_sd
-from enhsim_tf.simulator.joint import telemetry_of
-from enhsim_tf.telemetry.pandas_series import index_of
+from enhsim_tf.simulator.joint import join_channels, telemetry_of
 from enhsim_tf.telemetry.placing import PlacedEvent, draw_begin, in_order, place_events
-from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.series import Telemetry, index_of
 
 
 def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -> pd.DataFrame:
-    """Injects anomalies into nominal telemetry: into one channel, or, if kinds are among `JOINT_KINDS`, into several.
+    """Injects anomalies into nominal telemetry: into one channel, or into several, of which each anomaly changes one or, of some kinds, all.
 
     Args:
         telemetry: Several channels, as `join_channels` returns them, or the parts of one channel, as `clean` returns them.
@@ -40,20 +38,19 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
         InputError: If anomalies overlap, do not fit or change no sample, or if the noise of the channel cannot be estimated.
     """
     if not isinstance(telemetry, Recording):
-        runs, first = tuple(Run(part.values[:, None], part.offset_s) for part in telemetry), telemetry[0]
-        telemetry = Recording(runs, (first.name,), first.interval_s, first.start, first.name)
+        (telemetry,) = join_channels({telemetry[0].name: telemetry})
     kinds, names, interval_s = options.kinds, telemetry.columns, telemetry.interval_s
     if options.is_joint and len(names) < 2:
         raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
     nominal, index = telemetry.values.astype(np.float32), index_of(telemetry_of(telemetry))
     series = [[part.values[:, channel] for part in telemetry.parts] for channel in range(len(names))]
     noise_sd = np.array([options.noise_sd or estimate_noise_sd(parts) for parts in series])
-    if not options.is_joint and not noise_sd[0] > 0:
+    if len(names) == 1 and not noise_sd[0] > 0:
         raise InputError(
             f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {names[0]}, in which every "
             "second difference is zero. Give the standard deviation with --noise-sd."
         )
-    rng = np.random.default_rng([options.seed, *([61] if options.is_joint else names[0].encode())])
+    rng = np.random.default_rng([options.seed, *([61] if len(names) > 1 else names[0].encode())])
     shortest, longest = length_limits(options.length, interval_s)
     drawn = [
         (kind, 1.0 if kind in WITHOUT_SEVERITY else draw_between(options.severity, rng), int(rng.integers(shortest, longest + 1)))
@@ -69,7 +66,7 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
     def changes(event: PlacedEvent) -> bool:
         """Puts an anomaly into the series; whether it has changed a sample."""
         here, channel = slice(event.begin, event.end), int(rng.integers(len(names)))
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             if event.kind == "common_shift":
                 values[here] = nominal[here] + (event.severity * noise_sd).astype(np.float32)
             else:
@@ -116,18 +113,3 @@ def _changed(
     weights, *_ = np.linalg.lstsq(centred, nominal[:, channel] - nominal[:, channel].mean(dtype=np.float64), rcond=None)
     follows = centred @ weights
     return nominal[here, channel] - follows[here] + follows[away]
-
-
-def join_injected(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Joins the tables of several channels to one with their values and `mask`, which marks what is changed in any of them."""
-    (first, frame), *others = frames.items()
-    for name, other in others:
-        if not other.index.equals(frame.index):
-            raise InputError(
-                f"Expected channels with the same times for one TimeEval file. Received: {first!r} with {len(frame):,} and {name!r} with "
-                f"{len(other):,} samples, or other times. Give a folder as --out, which gets one file per channel."
-            )
-    values = {name: each["value"] for name, each in frames.items()}
-    joined = pd.DataFrame(values | {"mask": np.any([each["mask"] for each in frames.values()], axis=0)}, index=frame.index)
-    joined.attrs = frame.attrs | {"anomalies": [anomaly for each in frames.values() for anomaly in each.attrs["anomalies"]]}
-    return joined

@@ -15,7 +15,6 @@ Values are in the column `value` or `window`. Of several channels, each has its 
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -79,21 +78,6 @@ def window_table(
         "mask": lists(mask),
     }
     return pa.table(columns | {f"mask {name}": lists(masks[:, :, number]) for number, name in enumerate(channels) if is_joint})
-
-
-def window_schema(window: int, channels: Sequence[str]) -> pa.Schema:
-    """Returns the schema of `window_table` for windows of some length."""
-    none = np.zeros((0, window, len(channels)), np.float32)
-    return window_table(none, none > 0, channels, [], []).schema
-
-
-def parquet_options(schema: pa.Schema) -> dict[str, Any]:
-    """Returns the options with which Parquet files of windows are written.
-
-    Values store bytes of equal significance together: signs and exponents compress well, noisy mantissas do not.
-    """
-    encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in schema.names if name.startswith("window")}
-    return {"compression": "zstd", "use_dictionary": ["scenario"], "column_encoding": encoding, "write_statistics": ["scenario"]}
 
 
 def write_table(path: str | os.PathLike, frame: pd.DataFrame, timeeval: Sequence[str] = ()) -> None:

@@ -63,19 +63,10 @@ def draw_schedule(
     lengths: tuple[int, int],
     rng: np.random.Generator,
 ) -> list[PlacedEvent]:
-    """Adds events at drawn places to those at given places, in the order of time.
+    """Adds events at drawn places to those at given places, in the order of time, in a series that begins at time 0.
 
-    The modes are used in turn, and events are at least the greatest length apart. They are placed by `placing.place_events`: `stuck`, for
-    example, changes nothing while the mechanism stands still.
-
-    Args:
-        simulator: The simulator, whose series begins at time 0.
-        num_samples: Length of the series.
-        given: Events at given places.
-        modes: Modes and severities of the drawn events, each of which draws its own severity; their onset is not used.
-        number: Number of events at drawn places.
-        lengths: Least and greatest length of a drawn event in samples.
-        rng: Random number generator.
+    The modes are used in turn; each event draws its severity, and its length in samples between the two `lengths`. Events are at least the
+    greatest length apart. They are placed by `placing.place_events`: `stuck`, for example, changes nothing while the mechanism stands still.
     """
     if simulator.is_run_model:
         simulator.alignment.draw(np.zeros(0, int), [*modes, *given], rng)  # refuses them

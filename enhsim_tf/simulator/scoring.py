@@ -28,7 +28,7 @@ from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
-from enhsim_tf.telemetry.pandas_series import index_of
+from enhsim_tf.telemetry.series import index_of
 from enhsim_tf.telemetry.windows import mean_over_windows
 
 _THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; only scores a window apart are independent
@@ -171,7 +171,7 @@ def score(
         options: Options of the scoring. None uses the defaults.
 
     Returns:
-        A data frame with the index of `pandas_series.to_series` and the columns `value` (of several channels, their names), with a run
+        A data frame with the index of `to_series` and the columns `value` (of several channels, their names), with a run
         `enhanced` (of several channels, `enhanced NAME`), `score` (scaled so that the threshold is 1), `flag` (whether the score is above 1),
         with a lasting departure `score_after` (scores against the new operating point), and with a run `out_of_range` (above 1, the coarse run
         is outside the training range). Samples in parts shorter than a window, or without a run, have NaN in place of scores. `frame.attrs` holds

@@ -15,7 +15,7 @@ _TRIES = 100  # drawn places of an event, before the series is said to have no p
 class PlacedEvent:
     """An anomaly or a degraded mode at a place in a series, which is nominal after its last sample."""
 
-    kind: str  # of `anomalies.INJECTIONS`, `inject_options.JOINT_KINDS` or `degraded.MODES`
+    kind: str  # of `anomalies.INJECTIONS`, `places.JOINT_KINDS` or `degraded.MODES`
     severity: float
     begin: int  # first sample
     length: int  # number of samples

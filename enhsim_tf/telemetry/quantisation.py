@@ -4,8 +4,6 @@ import dataclasses
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
-
 _OFTEN = 3  # a value of quantised telemetry counts as a level if it occurs at least this often
 _LEAST_SHARE = 0.99  # of the values that must be levels; the others may be interpolated
 _UNEVEN = 0.1  # largest deviation of a level from a multiple of the step, in steps
@@ -14,15 +12,11 @@ _SAME = 1e-6  # values closer than this share of their range are one level: the 
 
 @dataclasses.dataclass(frozen=True)
 class Levels:
-    """Evenly spaced levels of a quantised channel; raises InputError if the step is not above 0."""
+    """Evenly spaced levels of a quantised channel."""
 
     step: float  # distance between neighbouring levels, in the unit of the telemetry
     origin: float  # one of the levels
     count: int  # number of levels that occur
-
-    def __post_init__(self):
-        if not self.step > 0:
-            raise InputError(f"Expected levels with a step above 0. Received: {self}.")
 
     @classmethod
     def find(cls, values: np.ndarray) -> "Levels | None":

@@ -35,7 +35,7 @@ def test_simulator_is_the_sum_of_its_waves(refused):
     first, second = TWO.waves
     assert (TWO(TIMES) == first(TIMES) + second(TIMES)).all()
     assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(TIMES).dtype == np.float32
-    assert TWO.levels == (0.5, 2.0) and TWO.shortest_period_s == 120
+    assert TWO.levels == (0.5, 2.0)
     assert level_offset_and_scale(TWO) == (1.25, 0.75)
     with refused("waves=[]"):
         SquareWaveSimulator([])

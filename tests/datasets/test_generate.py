@@ -18,13 +18,10 @@ import pytest
 from enhsim_tf.__main__ import main
 from enhsim_tf.common import console
 from enhsim_tf.common.atomic_files import sha256
-from enhsim_tf.datasets import generate
-from enhsim_tf.datasets import plan as plan_module
-from enhsim_tf.datasets.folder import find_problems, locked
-from enhsim_tf.datasets.generate import generate_data_set
+from enhsim_tf.datasets import generate, labelled_windows
+from enhsim_tf.datasets.generate import find_problems, generate_data_set, locked
+from enhsim_tf.datasets.labelled_windows import make_plan, shard_file
 from enhsim_tf.datasets.places import ScenarioRange
-from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.datasets.shard import shard_file
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from tests.small_data_set import SCENARIOS, PlainMaker, plain, plan
 
@@ -301,7 +298,7 @@ def serially(folder, model, windows, scenarios, monkeypatch):
 
 
 def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(plan_module, "_SHARD", 50)
+    monkeypatch.setattr(labelled_windows, "_SHARD", 50)
     asked = ["generate", str(models / "volts"), "--windows", "150", "--scenario", "friction:0-1", "--seed", "5"]
     assert main([*asked, "--workers", "2", "--out", str(tmp_path / "set")]) == 0
     assert "volts: 150 windows of 60 samples in 3 shards in " in capsys.readouterr().out
@@ -317,8 +314,8 @@ def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monk
 @pytest.mark.slow
 def test_a_run_goes_on_when_a_machine_of_its_cluster_is_lost(models, tmp_path, monkeypatch):
     cluster_utils = pytest.importorskip("ray.cluster_utils", reason="the optional extra ray is not installed")
-    monkeypatch.setattr(plan_module, "_SHARD", 50)
-    script = "import sys\nfrom enhsim_tf.__main__ import main\nfrom enhsim_tf.datasets import plan\nplan._SHARD = 50\nsys.exit(main())"
+    monkeypatch.setattr(labelled_windows, "_SHARD", 50)
+    script = "import sys\nfrom enhsim_tf.__main__ import main\nfrom enhsim_tf.datasets import labelled_windows\nlabelled_windows._SHARD = 50\nsys.exit(main())"
     command = [sys.executable, "-c", script, "generate", models / "volts", "--windows", "6000", "--seed", "5", "--engine", "ray"]
     cluster = cluster_utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     try:

@@ -7,10 +7,11 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.datasets.inject import inject, join_injected
-from enhsim_tf.datasets.inject_options import JOINT_KINDS, InjectOptions
+from enhsim_tf.datasets.inject import inject
 from enhsim_tf.datasets.label_columns import LABELS, series_table, write_table
+from enhsim_tf.datasets.places import JOINT_KINDS, InjectOptions
 from enhsim_tf.detection.anomalies import INJECTIONS
+from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.placing import draw_begin
 from enhsim_tf.telemetry.series import Telemetry
@@ -99,17 +100,16 @@ def test_channels_draw_independently_and_the_same_seed_gives_the_same_table():
 
 @pytest.mark.parametrize("times", [True, False])
 def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refused):
-    volts, amps = (inject(parts(times, False, name), InjectOptions(("level_shift",), number=2)) for name in ("volts", "amps"))
-    write_table(tmp_path / "x.csv", join_injected({"volts": volts, "amps": amps}), ["volts", "amps"])
+    (both,) = join_channels({name: parts(times, False, name) for name in ("volts", "amps")})
+    frame = inject(both, InjectOptions(("level_shift",), number=4))
+    write_table(tmp_path / "x.csv", frame, ["volts", "amps"])
     read = pd.read_csv(tmp_path / "x.csv")
     assert list(read) == ["timestamp", "volts", "amps", "is_anomaly"] and read["is_anomaly"].isin([0, 1]).all()
-    np.testing.assert_array_equal(read["is_anomaly"], volts["mask"].to_numpy() | amps["mask"].to_numpy())
-    np.testing.assert_array_equal(read["volts"].astype(np.float32), volts["value"])
+    np.testing.assert_array_equal(read["is_anomaly"], frame["mask volts"] | frame["mask amps"])
+    np.testing.assert_array_equal(read["volts"].astype(np.float32), frame["volts"])
     assert read["timestamp"].iloc[1] == ("2024-01-01 00:00:10" if times else 1)
-    with refused("same times", "'amps' with 2,999"):
-        join_injected({"volts": volts, "amps": amps.iloc[1:]})
     with refused("'is_anomaly'"):
-        write_table(tmp_path / "y.csv", volts, ["is_anomaly"])
+        write_table(tmp_path / "y.csv", frame, ["is_anomaly"])
     assert not (tmp_path / "y.csv").exists()
 
 

@@ -9,8 +9,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.datasets.plan import Plan
-from enhsim_tf.datasets.shard import write_windows
+from enhsim_tf.datasets.labelled_windows import Plan, write_windows
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.joint import join_channels

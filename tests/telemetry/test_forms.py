@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.datasets.inject import inject
-from enhsim_tf.datasets.inject_options import InjectOptions
 from enhsim_tf.datasets.label_columns import write_table
+from enhsim_tf.datasets.places import InjectOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.times import epoch_unit
 from enhsim_tf.telemetry.reading.columns import anomalous

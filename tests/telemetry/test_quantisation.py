@@ -47,9 +47,3 @@ def test_values_are_rounded_to_the_nearest_level():
     levels = Levels(0.5, 0.1, 4)
     np.testing.assert_allclose(levels.round(np.array([0.1, 0.34, 0.36, -0.2, 7.0])), [0.1, 0.1, 0.6, -0.4, 7.1], rtol=1e-6)
     assert levels.round(np.zeros((2, 3))).dtype == np.float32
-
-
-@pytest.mark.parametrize("step", [0.0, -0.5, np.nan])
-def test_a_step_that_is_not_above_zero_is_refused(refused, step):
-    with refused("step above 0", f"step={step}"):
-        Levels(step, 0.0, 2)

@@ -12,7 +12,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.local import run_local
 from enhsim_tf.common.parallel.ray import run_ray
 
-ENGINES = {"local": 512, "ray": 10_000}  # name: maximum number of workers
+ENGINES = {"local": (run_local, 512), "ray": (run_ray, 10_000)}  # with the maximum number of workers
 
 
 def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: int | None = None) -> Iterator[Any]:
@@ -25,22 +25,17 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
             that memory does not grow with their number.
         workers: Number of processes. None: one per CPU.
 
-    Yields:
-        The result of `work` for each item.
-
     Raises:
         InputError: If `work` raises one, if the engine cannot be used, or if its processes keep dying (`ProcessesDiedError`).
     """
-    if engine not in ENGINES:
-        raise InputError(f"Expected an engine, one of: {', '.join(ENGINES)}. Received: {engine!r}.")
-    return {"local": run_local, "ray": run_ray}[engine](pickle.dumps(work), iter(items), workers)
+    return ENGINES[engine][0](pickle.dumps(work), iter(items), workers)
 
 
 def parse_workers(text: str | None, engine: str | None = None) -> int | None:
     """Parses the option `--workers auto|N`, for the engine `local` if none is given: a number, or None for one per CPU."""
     if text in (None, "auto"):
         return None
-    most = ENGINES[engine or "local"]
+    _, most = ENGINES[engine or "local"]
     if not (text.isdecimal() and 1 <= int(text) <= most):
         raise InputError(f"Expected --workers auto, or a number from 1 to {most:,}. Received: {text!r}.")
     return int(text)

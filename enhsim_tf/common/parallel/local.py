@@ -19,8 +19,6 @@ from enhsim_tf.common.errors import InputError
 
 MAX_FAILURES = 5  # consecutive deaths of workers after which work is given up at the next
 
-_work: Callable[[Any], Any] | None = None  # the function that a pool process calls for each item
-
 
 class ProcessesDiedError(InputError):
     """Raised when too many workers died in a row.
@@ -42,12 +40,12 @@ def run_local(work: bytes, items: Iterator[Any], workers: int | None) -> Iterato
     """Implements `engines.run` with processes of this machine; `work` is pickled."""
     num_processes, retry, failures = workers or num_cpus(), collections.deque(), 0
     while failures <= MAX_FAILURES:
-        with _pool(work, num_processes) as pool:  # it starts a process when an item is submitted and none is idle
+        with _pool(num_processes) as pool:  # it starts a process when an item is submitted and none is idle
             running: dict[concurrent.futures.Future, Any] = {}
             try:
                 while True:
                     while len(running) < 2 * num_processes and (item := retry.popleft() if retry else next(items, None)) is not None:
-                        running[_submit(pool, item, retry)] = item
+                        running[_submit(pool, work, item, retry)] = item
                     if not running:
                         return
                     for done in concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED).done:
@@ -66,12 +64,12 @@ def num_cpus() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, retry: collections.deque) -> concurrent.futures.Future:
+def _submit(pool: concurrent.futures.ProcessPoolExecutor, work: bytes, item: Any, retry: collections.deque) -> concurrent.futures.Future:
     """Submits an item to the pool. A process started by this call ignores SIGINT, which the parent process handles."""
     masked = hasattr(signal, "pthread_sigmask")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masked else None
     try:
-        return pool.submit(_call, item)
+        return pool.submit(call, work, item)
     except BrokenProcessPool:
         retry.appendleft(item)
         raise
@@ -81,10 +79,10 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, retry: coll
 
 
 @contextlib.contextmanager
-def _pool(work: bytes, workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
+def _pool(workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
     """A pool of spawned processes that is terminated at once if the block raises. Forking is not used, since TensorFlow hangs."""
     others = set(multiprocessing.active_children())
-    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _start_pool_worker, (work,))
+    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _watch_parent)
     is_done = False
     try:
         yield pool
@@ -96,7 +94,7 @@ def _pool(work: bytes, workers: int) -> Iterator[concurrent.futures.ProcessPoolE
 
 
 @functools.lru_cache(1)
-def start_worker(work: bytes) -> Callable[[Any], Any]:
+def _start_worker(work: bytes) -> Callable[[Any], Any]:
     """Prepares a process of any engine, and returns the unpickled function.
 
     The thread counts are set before `work` is unpickled, because unpickling imports the libraries that read them.
@@ -110,9 +108,12 @@ def start_worker(work: bytes) -> Callable[[Any], Any]:
     return function
 
 
-def _start_pool_worker(work: bytes) -> None:
-    global _work
-    _work = start_worker(work)
+def call(work: bytes, item: Any) -> Any:
+    """Calls the pickled function for an item, in a process of any engine."""
+    return _start_worker(work)(item)
+
+
+def _watch_parent() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -120,7 +121,3 @@ def _end_with_parent() -> None:
     """Ends this process when its parent has ended. A killed parent cannot shut the pool down, so its workers would wait forever."""
     multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
     os._exit(1)
-
-
-def _call(item: Any) -> Any:
-    return _work(item)

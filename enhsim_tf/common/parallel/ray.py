@@ -12,13 +12,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.common.parallel.local import MAX_FAILURES, ProcessesDiedError, start_worker
+from enhsim_tf.common.parallel.local import MAX_FAILURES, ProcessesDiedError, call
 
 _ANSWER_S = 10
-
-
-def _call(work: bytes, item: Any) -> Any:
-    return start_worker(work)(item)
 
 
 def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
@@ -29,12 +25,12 @@ def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[
     with _cluster() as ray:
         cpus = max(1, int(ray.cluster_resources().get("CPU", 1)))
         number, running, item = workers or cpus, {}, first
-        call = ray.remote(_call).options(num_cpus=min(1, cpus / number), max_retries=MAX_FAILURES, scheduling_strategy="SPREAD")
+        task = ray.remote(call).options(num_cpus=min(1, cpus / number), max_retries=MAX_FAILURES, scheduling_strategy="SPREAD")
         lost = tuple(getattr(ray.exceptions, f"{name}Error") for name in ("WorkerCrashed", "ObjectLost", "NodeDied", "OutOfMemory"))
         try:
             while True:
                 while item is not None and len(running) < 2 * number:
-                    running[call.remote(work, item)] = item
+                    running[task.remote(work, item)] = item
                     item = next(items, None)
                 if not running:
                     return
@@ -48,8 +44,8 @@ def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[
                 del running[done]
                 yield result
         finally:
-            for task in running:
-                ray.cancel(task, force=True)
+            for left in running:
+                ray.cancel(left, force=True)
 
 
 @contextlib.contextmanager

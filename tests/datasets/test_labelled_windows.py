@@ -12,12 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.common.atomic_files import write_json
-from enhsim_tf.datasets import plan as plan_module
-from enhsim_tf.datasets.folder import MANIFEST, check_folder
+from enhsim_tf.datasets import labelled_windows
+from enhsim_tf.datasets.generate import MANIFEST, check_folder
 from enhsim_tf.datasets.label_columns import LABELS
+from enhsim_tf.datasets.labelled_windows import ShardMaker, draw_scenarios, make_plan, plan_key, shard_file, systematic, write_windows
 from enhsim_tf.datasets.places import ScenarioRange
-from enhsim_tf.datasets.plan import make_plan, plan_key
-from enhsim_tf.datasets.shard import ShardMaker, draw_scenarios, shard_file, systematic, write_windows
 from tests.known_simulators import of_waves
 from tests.small_data_set import COARSE, INTERVAL_S, WINDOW, PlainMaker, plain, plan
 
@@ -106,7 +105,7 @@ def test_other_programs_can_read_the_file(tmp_path):
 
 def test_a_worker_with_other_library_versions_is_refused(tmp_path, monkeypatch, refused):
     maker = ShardMaker(plan(), tmp_path)
-    monkeypatch.setattr(plan_module.importlib.metadata, "version", lambda name: "0.0")
+    monkeypatch.setattr(labelled_windows.importlib.metadata, "version", lambda name: "0.0")
     with refused("every machine", "numpy"):
         maker(0)
 

@@ -1,14 +1,19 @@
-"""Generates labelled windows and writes them to Parquet files: all of them to one, or each shard to a file of its own.
+"""Labelled windows: the plan of a set of them, and writing them to Parquet files, all to one, or each shard to a file of its own.
 
 The windows of a shard depend only on the plan and the number of the shard, which has a random seed of its own. The bytes of a shard are
-therefore the same in every worker and in every order of generation.
+therefore the same in every worker and in every order of generation. Two plans with the same `plan_key` describe the same shards.
 """
 
 import contextlib
+import dataclasses
 import functools
+import hashlib
+import importlib.metadata
+import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,14 +21,107 @@ import pyarrow.parquet as pq
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import replace_file, sha256
-from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.label_columns import NOMINAL, parquet_options, window_schema, window_table
-from enhsim_tf.datasets.plan import FORMAT, Plan, plan_key
+from enhsim_tf.common.errors import InputError, counted
+from enhsim_tf.datasets.label_columns import NOMINAL, window_table
+from enhsim_tf.datasets.places import ScenarioRange
 from enhsim_tf.simulator.model_folder import MANIFEST
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 
+FORMAT = "enhsim_tf.datasets.generate/5"
+MOST_WINDOWS = 10**10
+_SHARD = 8_000  # windows per shard, for windows of up to 500 samples
+_SHARD_VALUES = 4_000_000  # values per shard, for longer windows
+_VERSIONS = ("numpy", "pyarrow")
 _STREAM = 0x666C656574  # distinguishes these seeds from all others in the package
 _KEY = b"settings"  # of the metadata of a file
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """The plan of a set of labelled windows: its scenarios, and what it uses of its model, a saved simulator."""
+
+    scenarios: tuple[ScenarioRange, ...]  # with equal shares of the windows that are not nominal
+    nominal_share: float
+    folder: Path  # the content of the windows does not depend on it
+    sha256: str  # of the manifest of the model, which contains the checksums of its files
+    window: int
+    interval_s: float
+    channels: tuple[str, ...]
+    seed: int
+    num_windows: int
+    shard: int  # windows per shard; the last one may have fewer
+
+    def __post_init__(self):
+        if not 1 <= self.num_windows <= MOST_WINDOWS:
+            raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: --windows {self.num_windows}.")
+        if self.nominal_share < 1 and round(self.num_windows * self.shares[-1], 6) < 1:
+            raise InputError(
+                f"Expected at least one window for each of {len(self.scenarios)} scenarios. Received: {counted(self.num_windows, 'window')}, of which a "
+                f"share of {self.nominal_share:g} is nominal. Ask for more windows."
+            )
+
+    @property
+    def shares(self) -> list[float]:
+        """Shares of the nominal windows and of those of each scenario."""
+        return [self.nominal_share, *[(1 - self.nominal_share) / len(self.scenarios) for _ in self.scenarios]]
+
+    @property
+    def num_shards(self) -> int:
+        """Number of shards."""
+        return -(-self.num_windows // self.shard)
+
+    def num_windows_in(self, shard: int) -> int:
+        """Returns the number of windows in a shard."""
+        return min(self.shard, self.num_windows - shard * self.shard)
+
+    def settings(self) -> dict[str, Any]:
+        """Returns all settings on which the content depends, in plain JSON types. Paths are not among them."""
+        settings = {
+            "windows": self.num_windows,
+            "shard": self.shard,
+            "seed": self.seed,
+            "window": self.window,
+            "interval_s": self.interval_s,
+            "channels": self.channels,
+            "nominal": self.nominal_share,
+            "scenarios": [dataclasses.asdict(scenario) for scenario in self.scenarios],
+            "model": self.sha256,
+            "versions": {name: importlib.metadata.version(name) for name in _VERSIONS},
+        }
+        return json.loads(json.dumps(settings))
+
+
+def plan_key(settings: Mapping[str, Any]) -> str:
+    """Returns the checksum of all settings except the number of windows. Shards with equal key, number and size have identical bytes."""
+    others = {name: value for name, value in settings.items() if name != "windows"}
+    return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
+
+
+def make_plan(
+    simulator: EnhancedSimulator,
+    folder: str | os.PathLike,
+    scenarios: Sequence[ScenarioRange],
+    nominal_share: float,
+    num_windows: int,
+    seed: int,
+) -> Plan:
+    """Makes the plan of labelled windows of a simulator that is saved in a folder. Without scenarios, all of them are nominal."""
+    folder = Path(folder).absolute()
+    rng = np.random.default_rng(0)
+    simulator.alignment.draw(np.zeros(len(scenarios), int), [each.draw(rng) for each in scenarios], rng)  # refuses what it cannot apply
+    window, channels = simulator.window, simulator.channels
+    return Plan(
+        tuple(scenarios),
+        nominal_share if scenarios else 1.0,
+        folder,
+        sha256(folder / MANIFEST),
+        window,
+        simulator.interval_s,
+        channels,
+        seed,
+        num_windows,
+        max(1, min(_SHARD, _SHARD_VALUES // (window * len(channels)))),
+    )
 
 
 def shard_file(shard: int) -> str:
@@ -57,8 +155,12 @@ def write_windows(path: str | os.PathLike, plan: Plan, simulator: EnhancedSimula
         shards: Numbers of the shards. None: all of them, one after the other.
     """
     about = {"format": FORMAT, _KEY: plan_key(plan.settings()), "interval_s": repr(plan.interval_s), "channel": ", ".join(plan.channels)}
-    schema = window_schema(plan.window, plan.channels).with_metadata(about)
-    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **parquet_options(schema)) as writer:
+    none = np.zeros((0, plan.window, len(plan.channels)), np.float32)
+    schema = window_table(none, none > 0, plan.channels, [], []).schema.with_metadata(about)
+    # bytes of equal significance are stored together: signs and exponents compress well, noisy mantissas do not
+    encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in schema.names if name.startswith("window")}
+    options = {"compression": "zstd", "use_dictionary": ["scenario"], "column_encoding": encoding, "write_statistics": ["scenario"]}
+    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
         for shard in range(plan.num_shards) if shards is None else shards:
             (seed,) = np.random.SeedSequence([_STREAM, plan.seed, shard, 1]).generate_state(1, np.uint64).tolist()
             scenarios, first = draw_scenarios(plan, shard), 0
