@@ -37,7 +37,7 @@ _PLACES = {
     "record": "coarse_simulator.recording",
     "score": "simulator.scoring",
     "series_labelled": "datasets.labelled_series",
-    "to_series": "telemetry.series",
+    "to_series": "telemetry.pandas_series",
     "update": "simulator.updating",
 }
 __all__ = list(_PLACES)

@@ -17,8 +17,9 @@ from enhsim_tf.datasets.label_columns import series_table
 from enhsim_tf.datasets.places import WITHOUT_SEVERITY, InjectOptions, checked_place, draw_between, length_limits
 from enhsim_tf.detection.anomalies import INJECTIONS, estimate_noise_sd
 from enhsim_tf.simulator.joint import join_channels, telemetry_of
+from enhsim_tf.telemetry.pandas_series import index_of
 from enhsim_tf.telemetry.placing import PlacedEvent, draw_begin, in_order, place_events
-from enhsim_tf.telemetry.series import Telemetry, index_of
+from enhsim_tf.telemetry.series import Telemetry
 
 
 def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -> pd.DataFrame:

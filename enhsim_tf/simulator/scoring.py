@@ -28,7 +28,7 @@ from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
-from enhsim_tf.telemetry.series import index_of
+from enhsim_tf.telemetry.pandas_series import index_of
 from enhsim_tf.telemetry.windows import mean_over_windows
 
 _THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; only scores a window apart are independent

@@ -4,10 +4,8 @@ This is the data source, step 4 of the paper's pipeline. Values are checked but 
 """
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 
@@ -70,9 +68,11 @@ def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -
     Raises:
         InputError: If `start` is not a time, or a sample lies outside the years 1678 to 2261, the range of int64 nanoseconds.
     """
+    import pandas as pd  # it parses every form of ISO 8601, with any zone
+
     try:
         text = telemetry.start or "1970-01-01"
-        start = pd.Timestamp(text if text[0].isdigit() else None)  # every form of ISO 8601, with any zone, but not "now"
+        start = pd.Timestamp(text if text[0].isdigit() else None)  # pandas would accept "now"
         start = start.tz_localize("UTC") if start.tz is None else start.tz_convert("UTC")
         samples = np.arange(first, len(telemetry) if stop is None else stop)
         start_s, since_s = start.timestamp(), telemetry.offset_s + telemetry.interval_s * samples
@@ -83,22 +83,6 @@ def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -
             f"Expected times from 1678 to 2261. Received: start={telemetry.start}, offset_s={telemetry.offset_s}. Correct them."
         )
     return start.as_unit("ns").value + np.round(since_s * 1e9).astype(np.int64)
-
-
-def to_series(telemetry: Telemetry) -> pd.Series:
-    """Converts telemetry to a pandas Series, with a `DatetimeIndex` in UTC, or a `RangeIndex` of sample numbers if it has no times."""
-    check_telemetry(telemetry)
-    if telemetry.has_time:
-        index = pd.DatetimeIndex(nanoseconds(telemetry).astype("datetime64[ns]"), tz="UTC", name="time")
-    else:
-        first = round(telemetry.offset_s)
-        index = pd.RangeIndex(first, first + len(telemetry), name="sample")
-    return pd.Series(telemetry.values, index=index, name=telemetry.name)
-
-
-def index_of(parts: Sequence[Telemetry]) -> pd.Index:
-    """Returns the index that the parts of a series have together, see `to_series`."""
-    return pd.concat([to_series(part) for part in parts]).index
 
 
 def check_telemetry(telemetry: Telemetry) -> None:

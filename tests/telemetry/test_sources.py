@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
-from enhsim_tf.telemetry.series import Telemetry, to_series
+from enhsim_tf.telemetry.pandas_series import to_series
+from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 
 N = 50
