@@ -124,5 +124,10 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
         raise InputError(
             f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."
         )
-    given = options.coarse, simulator.alignment.columns, options.coarse_time
-    return read_recording(*given, cleaning.of_run(), simulator.interval_s, options.coarse_start)
+    columns = simulator.alignment.columns
+    try:
+        return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)
+    except InputError as error:
+        if series.table is None or not set(columns) <= set(series.table):
+            raise
+        raise InputError(f"{error} Perhaps {options.source}, which has the columns of the run, is the run. Swap the two.") from None

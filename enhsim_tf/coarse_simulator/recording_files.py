@@ -105,6 +105,11 @@ def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, clea
     if cleaning.interval_s is not None or not isinstance(first.index, pd.DatetimeIndex):
         return dict(raw), ""
     times = np.unique(first.index.dropna().as_unit("ns").asi8)
+    if len(first) > 2 * len(times):  # not only an event at each step
+        raise InputError(
+            f"Expected a time for each row of the coarse run. Received: {len(first):,} rows with {len(times):,} different times. If the clock lost "
+            "digits, export it as text; if they belong to several series, give one of them."
+        )
     interval = find_interval(times) if len(times) > 2 else 1.0
     regular = regular_step_fraction(times, interval) if len(times) > 2 else 1.0
     if regular > 1 - _FEW_ODD:

@@ -62,11 +62,12 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
         severity = draw_between(options.severity, rng) if place.severity is None else place.severity
         given.append(PlacedEvent(place.kind, severity, *place.samples(index, interval_s)))
     bounds = list(itertools.pairwise(np.cumsum([0, *map(len, telemetry.parts)]).tolist()))
-    values, found = nominal.copy(), []
+    values, found, noisy = nominal.copy(), [], np.flatnonzero(noise_sd > 0)  # noise is the unit of severity
 
     def changes(event: PlacedEvent) -> bool:
         """Puts an anomaly into the series; whether it has changed a sample."""
-        here, channel = slice(event.begin, event.end), int(rng.integers(len(names)))
+        among = noisy if event.kind in INJECTIONS else np.arange(len(names))
+        here, channel = slice(event.begin, event.end), int(among[rng.integers(len(among))])
         with np.errstate(over="ignore", invalid="ignore"):
             if event.kind == "common_shift":
                 values[here] = nominal[here] + (event.severity * noise_sd).astype(np.float32)

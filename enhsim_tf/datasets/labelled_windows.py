@@ -56,7 +56,7 @@ class Plan:
             raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: --windows {self.num_windows}.")
         if self.nominal_share < 1 and round(self.num_windows * self.shares[-1], 6) < 1:
             raise InputError(
-                f"Expected at least one window for each of {len(self.scenarios)} scenarios. Received: {counted(self.num_windows, 'window')}, of which a "
+                f"Expected at least one window for each of {counted(len(self.scenarios), 'scenario')}. Received: {counted(self.num_windows, 'window')}, of which a "
                 f"share of {self.nominal_share:g} is nominal. Ask for more windows."
             )
 

@@ -181,3 +181,10 @@ def test_the_zero_of_a_run_can_be_given(written, refused):
 def test_a_frame_is_a_run_whose_clock_is_no_input():
     for time in (None, "none"):
         assert read_recording(stepped(2.0 * np.arange(60)), time=time).columns == ("volts", "amps")
+
+
+def test_a_run_of_which_most_rows_share_their_time_is_refused(refused):
+    table = pd.DataFrame({"time": np.repeat(np.arange(20.0), 3), "volts": np.arange(60.0)})
+    with refused("60 rows with 20 different times"):
+        read_recording(table)
+    assert len(read_recording(table.iloc[::3])) == 20

@@ -212,10 +212,7 @@ REFUSED = {
     "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), "if the clock lost digits"),
     "minutes where there are seconds": (table("time,v", ["2024-03-01 00:00", "2024-03-01 00:01"] * 30, VALUES), "2 different"),
     "thousands or decimals": (table("time;v", MINUTES, ["1,500"] * N, separator=";"), "--decimal"),
-    "points and commas": (
-        table("time;v;w", MINUTES, commas(VALUES), VALUES, separator=";"),
-        "'20.0' at line 2 of w (60 in all). Give decimal",
-    ),
+    "points and commas": (table("time;v;w", MINUTES, commas(VALUES), VALUES, separator=";"), "a point in 'w'"),
     "a longer line": (table("time,v", MINUTES, VALUES).replace(f",{VALUES[5]}\n", ",1,2,3\n", 1), "line 7 has 4"),
     "a cell that is left out between blanks": (
         table("t v w", SECONDS, VALUES, VALUES, separator=" ").replace(f" {VALUES[5]}", "", 1),
@@ -229,10 +226,7 @@ REFUSED = {
         f"mV' at line {2 + np.argmax(VALUES <= 16)}",
     ),
     "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), "'v' more than once"),
-    "numbered sensors": (
-        table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)),
-        "different times. If they belong to several series, give series_column",
-    ),
+    "numbered sensors": (table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)), "--series-column sensor_id"),
 }
 
 

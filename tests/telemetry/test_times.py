@@ -58,7 +58,9 @@ def test_times_that_step_back_by_an_hour_are_refused(refused, minutes):
         refuse_steps_back(60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts", has_zone=False)
 
 
-def test_a_date_that_stays_past_midnight_is_refused_with_a_zone_too(refused):
-    minutes = np.array([1_400, 1_420, 0, 20])
-    with refused("row 2 of volts", "one day"):
-        refuse_steps_back(60 * 10**9 * minutes, np.arange(4), Log(), "volts", has_zone=True)
+@pytest.mark.parametrize("minutes", [[1_400, 1_420, 0, 20], [120, 140, 80, 100]])
+def test_a_step_back_by_a_day_or_an_hour_is_refused_unless_a_zone_is_known(refused, minutes):
+    given = 60 * 10**9 * np.array(minutes), np.arange(4), Log(), "volts"
+    with refused("row 2 of volts", "one day" if minutes[0] > 1_000 else "one hour"):
+        refuse_steps_back(*given, has_zone=False)
+    refuse_steps_back(*given, has_zone=True)

@@ -128,7 +128,7 @@ def _without(cells: pd.Series, missing_values: Sequence[float | str]) -> tuple[p
 
 
 def _advice(cell: Any) -> str:
-    if isinstance(cell, str) and re.fullmatch(rf"{_COMMA_THOUSANDS}|{_COMMA}|[+-]?\d+\.\d+", cell.strip()):
+    if isinstance(cell, str) and re.fullmatch(f"{_COMMA_THOUSANDS}|{_COMMA}", cell.strip()):
         return "Give decimal (--decimal , or --decimal .), or leave them out with drop_bad=True (--drop-bad)."
     return "Correct them, name words with missing_values (--missing-values), or leave them out with drop_bad=True (--drop-bad)."
 

@@ -314,9 +314,9 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
 def refuse_steps_back(times: np.ndarray, rows: np.ndarray, log: CleaningLog, name: str, has_zone: bool) -> None:
     """Refuses times that step back where sorting would mix what happened at different times.
 
-    These are times that count from zero and begin again, as after a restart, and dates that step back by a day to where there were none, as
-    where the date of the first day stays past midnight; without a zone, also dates that step back by about one hour only, as a local clock
-    does. `times` are nanoseconds in the order of the source, and `rows` their rows there.
+    These are times that count from zero and begin again, as after a restart, and, unless a zone is given or stated, dates that step back by about
+    one hour only, as a local clock does, or by a day to where there were none, as where the date of the first day stays past midnight.
+    `times` are nanoseconds in the order of the source, and `rows` their rows there.
     """
     steps, hour = np.diff(times), UNITS_NS["h"]
     usual = np.median(np.abs(steps)) if len(steps) else 0
@@ -328,11 +328,14 @@ def refuse_steps_back(times: np.ndarray, rows: np.ndarray, log: CleaningLog, nam
         )
         how = "count from zero and begin again, as after a restart"
         then = "Read the parts one by one, or give time 'none' (--time none) to count the samples"
-    elif not has_zone and usual < hour / 2 and (np.abs(steps[back] + hour) <= 2 * usual).all():
+    elif has_zone or usual >= hour / 2:
+        return
+    elif (np.abs(steps[back] + hour) <= 2 * usual).all():
         how = "state no zone and step back by one hour, as local clocks do"
         then = "Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)"
-    elif usual < hour / 2 and (np.abs(steps[back] + UNITS_NS["D"]) <= 2 * usual).all() and len(np.unique(times)) == len(times):
-        how, then = "step back by one day, as where a date stays past midnight", "Correct the dates"
+    elif (np.abs(steps[back] + UNITS_NS["D"]) <= 2 * usual).all() and len(np.unique(times)) == len(times):
+        how = "state no zone and step back by one day, as where a date stays past midnight"
+        then = "Correct them, or give timezone (--timezone UTC, or another) to sort them"
     else:
         return
     if len(back):

@@ -184,6 +184,8 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
             chosen.append(name)
     if not chosen and "_field" in frame and "_value" in layout.channels:
         return ["_field"]
+    if not chosen and times is not None:
+        _refuse_numbered(frame, layout, times, what)
     return chosen
 
 
@@ -235,6 +237,19 @@ def _overlap(times: np.ndarray, codes: np.ndarray) -> bool:
     """Whether every series covers at least half of the whole time."""
     spans = pd.Series(times).groupby(codes).agg(["min", "max"])
     return bool(((spans["max"] - spans["min"]) >= 0.5 * np.ptp(times)).all())
+
+
+def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, what: str) -> None:
+    """Refuses a table in which numbers, such as those of sensors, tell series apart, because a channel may look alike."""
+    if _repeating(frame, [], times) <= _OFTEN:
+        return
+    for name, cells in frame.items():
+        is_number = pd.api.types.is_integer_dtype(cells.dtype) and name not in layout.clock.columns and layout.channels != (name,)
+        if is_number and 1 < cells.nunique() <= _MAX_SERIES and _repeating(frame, [name], times) < 0.02:
+            raise InputError(
+                f"Expected one row for each time. Received: times that repeat, with different values of {name!r}, in {what}. Give "
+                f"series_column (--series-column {name}) if it tells several series apart."
+            )
 
 
 def _name_series(frame: pd.DataFrame, keys: Sequence[str], channels: Sequence[str], what: str) -> dict[str, tuple[str, np.ndarray]]:

@@ -77,6 +77,8 @@ def _read_rows(data: str, dialect: Dialect, name: str, decimal: str | None) -> t
     frame = _parse(data, dialect, name, sign)
     if sign is None and any(is_text(frame[column]) and _shows_comma(frame[column]) for column in frame):
         sign, frame = ",", _parse(data, dialect, name, ",")
+    if sign == "," and decimal is None:
+        _check_points(frame, names, name)
     return frame, sign
 
 
@@ -96,6 +98,20 @@ def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str
             "separate thousands. Give decimal (--decimal . or --decimal ,)."
         )
     return "," if not pointed and any(has_commas(cells) for cells in columns) else None
+
+
+def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
+    """Refuses numbers with decimal points in one column of a file that has decimal commas in others."""
+    for column in frame:
+        if not is_text(frame[column]):
+            continue
+        cells = frame[column].iloc[:: max(1, len(frame) // _LOOK)].dropna().astype("str").str.strip()
+        points = cells[cells.str.fullmatch(r"[+-]?\d+\.\d+").to_numpy(bool)]
+        if len(points) > len(cells) / 2 and not allows_point_thousands(points):
+            raise InputError(
+                f"Expected one decimal sign in all columns. Received: a point in {names[column]!r} ({points.iloc[0]}), commas in others, in {name}. "
+                "Give decimal (--decimal . or --decimal ,)."
+            )
 
 
 def _parse(data: str, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
