@@ -23,6 +23,7 @@ _Answer = TypeVar("_Answer")
 _SHOWN = 3  # number of series listed in a message
 _RANGE = "start: time(v: -9223372036000000000), stop: time(v: 9223372036854775806)"  # all times that InfluxDB has, from a whole second
 _URL = r"https?://(?:[\w.-]+|\[[\da-fA-F:.]+\])(?::[1-9]\d{0,4})?(?:/[!-~]*)?"  # without a name or a password
+_TIMEOUT_MS = 60_000  # of a request, unless INFLUXDB_V2_TIMEOUT is set; a disk may be slow
 _MAY_PASS = (408, 429, 500, 502, 503, 504)  # HTTP status codes of a server that is busy or still starting
 
 
@@ -177,6 +178,8 @@ class InfluxStore:
         options = {"redirect": False, "allowed_methods": None, "status_forcelist": _MAY_PASS, "raise_on_status": False}
         try:
             client = InfluxDBClient.from_env_properties(retries=Retry(retries, backoff_factor=0.1, backoff_max=5, **options))
+            if "INFLUXDB_V2_TIMEOUT" not in os.environ:
+                client.api_client.configuration.timeout = _TIMEOUT_MS
             return request(client)
         except (ApiException, FluxQueryException, FluxCsvParserException, HTTPError, OSError) as error:
             status = getattr(error, "status", None)
