@@ -46,9 +46,10 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
     nominal, index = telemetry.values.astype(np.float32), index_of(telemetry_of(telemetry))
     series = [[part.values[:, channel] for part in telemetry.parts] for channel in range(len(names))]
     noise_sd = np.array([options.noise_sd or estimate_noise_sd(parts) for parts in series])
-    if len(names) == 1 and not noise_sd[0] > 0:
+    noisy = np.flatnonzero(noise_sd > 0)
+    if not len(noisy) and (options.at or set(kinds) & set(INJECTIONS)):
         raise InputError(
-            f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {names[0]}, in which every "
+            f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {telemetry.name}, in which every "
             "second difference is zero. Give the standard deviation with --noise-sd."
         )
     rng = np.random.default_rng([options.seed, *([61] if len(names) > 1 else names[0].encode())])
@@ -62,7 +63,7 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
         severity = draw_between(options.severity, rng) if place.severity is None else place.severity
         given.append(PlacedEvent(place.kind, severity, *place.samples(index, interval_s)))
     bounds = list(itertools.pairwise(np.cumsum([0, *map(len, telemetry.parts)]).tolist()))
-    values, found, noisy = nominal.copy(), [], np.flatnonzero(noise_sd > 0)  # noise is the unit of severity
+    values, found = nominal.copy(), []
 
     def changes(event: PlacedEvent) -> bool:
         """Puts an anomaly into the series; whether it has changed a sample."""

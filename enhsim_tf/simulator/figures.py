@@ -133,7 +133,7 @@ def inject_figure(frame: pd.DataFrame, channels: Sequence[str]) -> matplotlib.fi
 
 
 class _Sheet:
-    """Panels below each other over the times of a table, with a label of each, and `above` inches of room above each."""
+    """One panel for each label, in one column over the times of a table, with `above` inches of free space above each panel."""
 
     def __init__(self, frame: pd.DataFrame, labels: Sequence[str], title: str, subtitle: str, command: str, above: float = 0.2):
         times = told_times(frame)
@@ -164,7 +164,7 @@ class _Sheet:
         axes.plot(np.insert(times, gaps, times[gaps]), np.insert(values, gaps, np.nan), color=color, linewidth=width)
 
     def shade(self, axes: Axes, spans: Sequence[tuple[int, int, str]]) -> None:
-        """Shades spans, given by first sample, end and word; of few, writes the words above the panel, where three lines have room."""
+        """Shades stretches of time, each given by its first sample, its end and a word; if they are few, writes the words in three lines above."""
         (low, high), taken = axes.get_xlim(), [0.0] * 3 if len(spans) <= _MOST_NAMED else []
         for begin, end, word in spans:
             first, after = self.times[begin], self.times[end - 1] + self.step  # the next sample may come after a gap

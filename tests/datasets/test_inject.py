@@ -143,6 +143,7 @@ def test_wrong_options_are_refused(wrong, refused):
         (parts(times=False, gap=False), {"at": ["ramp@2024-01-01/5"]}, "sample number"),
         (parts(), {"kinds": ["ramp"], "length": ("20min", "50")}, "20min:50"),
         ([Telemetry(np.arange(200, dtype=np.float32))], {"kinds": ["ramp"]}, "--noise-sd"),
+        (Recording((Run(np.outer(np.arange(200), [3, -2]).astype(np.float32)),), ("a", "b")), {"kinds": ["delay", "ramp"]}, "--noise-sd"),
         (parts(), {"at": ["ramp@100/50", "gain@149/5"]}, "do not overlap. Received: ramp at 4 from sample 100 to 150"),
         (parts(), {"at": ["ramp@990/20"]}, "2,800 samples in 2 parts"),
         (parts(gap=False), {"kinds": ["ramp"], "length": ("1600", "1600"), "number": 2}, "3,000 samples with 1 event, nowhere"),
@@ -214,3 +215,10 @@ def test_a_joint_anomaly_that_changes_nothing_is_drawn_again():
     for seed in range(5):
         frame = inject(Recording((Run(values),), ("a", "b"), name="ab"), InjectOptions(["delay"], number=3, seed=seed))
         assert {each.channel for each in frame.attrs["anomalies"]} == {"a"}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_anomaly_of_one_of_several_channels_is_put_into_one_that_has_noise(seed):
+    values = np.stack([np.full(900, 5.0), 0.2 * np.random.default_rng(0).standard_normal(900)], axis=1).astype(np.float32)
+    frame = inject(Recording((Run(values),), ("level", "volts")), InjectOptions(at=["ramp@100/50"], seed=seed))
+    assert [each.channel for each in frame.attrs["anomalies"]] == ["volts"]
