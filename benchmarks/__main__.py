@@ -18,10 +18,15 @@ def machine() -> dict:
     name = re.search(r"^model name\s*: (.*)$", text, re.MULTILINE)
     return {
         "processor": name[1].strip() if name else platform.processor() or platform.machine(),
-        "instruction_sets": sorted(set(re.findall(r"\b(?:sse4_2|avx\w*|fma|amx\w*|asimd|sve\w*)\b", text))),
+        "instruction_sets": sorted(
+            set(re.findall(r"\b(?:sse4_2|avx\w*|fma|amx\w*|asimd|sve\w*)\b", text))
+        ),
         "cores": os.cpu_count(),
         "python": platform.python_version(),
-        **{name: _version(name) for name in ("tensorflow", "keras", "tf_keras", "torch", "numpy", "pyarrow")},
+        **{
+            name: _version(name)
+            for name in ("tensorflow", "keras", "tf_keras", "torch", "numpy", "pyarrow")
+        },
     }
 
 
@@ -39,7 +44,12 @@ def main(arguments: list[str] | None = None) -> int:
         description="Speed of enhsim_tf, compared with other implementations and with the limits of the machine, in some minutes. "
         "`python -m book --tables` then takes the results into docs/speed.md.",
     )
-    parser.add_argument("--out", type=Path, default=RESULTS, help="the results (default: results.json beside this program)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=RESULTS,
+        help="the results (default: results.json beside this program)",
+    )
     options = parser.parse_args(arguments)
 
     from benchmarks import rows

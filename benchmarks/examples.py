@@ -70,6 +70,8 @@ def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], float]]:
 def copy(num_bytes: int) -> Work:
     """Prepares the limit of the machine for training: all cores copy `num_bytes` in total, without allocating memory."""
     num_cores = os.cpu_count() or 1
-    source, target = (np.ones((num_cores, num_bytes // 8 // num_cores), np.float32) for _ in range(2))
+    source, target = (
+        np.ones((num_cores, num_bytes // 8 // num_cores), np.float32) for _ in range(2)
+    )
     pool = ThreadPoolExecutor(num_cores)
     return lambda: list(pool.map(np.copyto, target, source)), num_bytes

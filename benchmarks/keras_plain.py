@@ -5,14 +5,25 @@ import numpy as np
 import tensorflow as tf
 from keras import layers
 
-from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work, epoch_clock, example_windows, gan_networks
+from benchmarks.examples import (
+    HIDDEN_UNITS,
+    WINDOW,
+    Work,
+    epoch_clock,
+    example_windows,
+    gan_networks,
+)
 
 
 def enhancer() -> keras.Model:
     """Builds the paper's enhancer."""
     widths = (WINDOW, HIDDEN_UNITS, HIDDEN_UNITS)
-    hidden = [layers.Dense(width, activation="relu", kernel_initializer="he_uniform") for width in widths]
-    return keras.Sequential([keras.Input((WINDOW,)), *hidden, layers.Dense(WINDOW, kernel_initializer="he_uniform")])
+    hidden = [
+        layers.Dense(width, activation="relu", kernel_initializer="he_uniform") for width in widths
+    ]
+    return keras.Sequential(
+        [keras.Input((WINDOW,)), *hidden, layers.Dense(WINDOW, kernel_initializer="he_uniform")]
+    )
 
 
 def enhancer_step(num_steps: int) -> Work:
@@ -46,8 +57,13 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
             gradients = tape.gradient(value, discriminator.trainable_variables)
             of_discriminator.apply(gradients, discriminator.trainable_variables)
         with tf.GradientTape() as tape:
-            value = loss(tf.ones((200, 1)), discriminator(generator(tf.random.normal((200, 16)), training=True), training=True))
-        of_generator.apply(tape.gradient(value, generator.trainable_variables), generator.trainable_variables)
+            value = loss(
+                tf.ones((200, 1)),
+                discriminator(generator(tf.random.normal((200, 16)), training=True), training=True),
+            )
+        of_generator.apply(
+            tape.gradient(value, generator.trainable_variables), generator.trainable_variables
+        )
 
     rng = np.random.default_rng(0)
     noise = rng.normal(0, 0.1, (1_500, WINDOW, 1)).astype(np.float32)
@@ -64,4 +80,9 @@ def enhance_and_noise(num_windows: int) -> Work:
     enhancing, (generator, _) = enhancer(), gan_networks(keras)
     coarse, _ = example_windows(num_windows)
     latent = np.random.default_rng(0).normal(size=(num_windows, 16)).astype(np.float32)
-    return lambda: enhancing.predict(coarse, verbose=0) + generator.predict(latent, verbose=0)[:, :, 0], num_windows
+    return (
+        lambda: (
+            enhancing.predict(coarse, verbose=0) + generator.predict(latent, verbose=0)[:, :, 0]
+        ),
+        num_windows,
+    )

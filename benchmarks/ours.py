@@ -34,11 +34,21 @@ def enhancer_step(num_steps: int) -> Work:
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
     """Prepares iterations of the paper's GAN: two updates of the discriminator on 200 rows and one of the generator, as in the compared code."""
-    settings = make_settings(iterations=num_iterations, record_every=num_iterations, rounds=1, update="two of 200", dropout=dropout)
-    gan = of_paper.NoiseGAN(of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings)
+    settings = make_settings(
+        iterations=num_iterations,
+        record_every=num_iterations,
+        rounds=1,
+        update="two of 200",
+        dropout=dropout,
+    )
+    gan = of_paper.NoiseGAN(
+        of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings
+    )
     gan.compile()
     noise = np.random.default_rng(0).normal(0, 0.1, (1_500, WINDOW)).astype(np.float32)
-    rows = of_paper.Rows(noise, settings.rows_of_each_kind, num_iterations, np.random.default_rng(0))
+    rows = of_paper.Rows(
+        noise, settings.rows_of_each_kind, num_iterations, np.random.default_rng(0)
+    )
 
     def run() -> None:
         gan.fit(rows, epochs=1, shuffle=False, verbose=0)
@@ -48,12 +58,19 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
 
 def simulator() -> EnhancedSimulator:
     """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
-    waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
+    waves = [
+        SquareWave(period_s=480, low=-0.5, high=0.5),
+        SquareWave(period_s=120, low=-0.25, high=0.25),
+    ]
     layers = tuple(tuple(layer.get_weights()) for layer in build_enhancer(make_settings()).layers)
-    enhancer = Enhancer(NETWORK, WINDOW, 1, 1, np.zeros(1, np.float32), np.zeros(WINDOW, np.float32), layers=layers)
+    enhancer = Enhancer(
+        NETWORK, WINDOW, 1, 1, np.zeros(1, np.float32), np.zeros(WINDOW, np.float32), layers=layers
+    )
     residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, WINDOW, 1)).astype(np.float32)
     alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, WINDOW)
-    return EnhancedSimulator(alignment, enhancer, WindowBootstrap(residuals), levels=np.array([[0.0, 1.0]]))
+    return EnhancedSimulator(
+        alignment, enhancer, WindowBootstrap(residuals), levels=np.array([[0.0, 1.0]])
+    )
 
 
 def enhance_and_noise(num_windows: int) -> Work:
@@ -62,7 +79,13 @@ def enhance_and_noise(num_windows: int) -> Work:
     enhancer, generator = build_enhancer(settings), of_paper.build_generator(settings)
     coarse = example_windows(num_windows)[0]
     noise = np.random.default_rng(0)
-    return lambda: enhance(enhancer, coarse) + of_paper.generate_noise(generator, num_windows, settings, noise), num_windows
+    return (
+        lambda: (
+            enhance(enhancer, coarse)
+            + of_paper.generate_noise(generator, num_windows, settings, noise)
+        ),
+        num_windows,
+    )
 
 
 def generate(num_windows: int) -> Work:
@@ -76,7 +99,9 @@ def generate_to_parquet(num_windows: int) -> Work:
     made, folder = simulator(), tempfile.TemporaryDirectory()
     made.save(os.path.join(folder.name, "model"))
     plan = make_plan(made, os.path.join(folder.name, "model"), (), 1.0, num_windows, seed=0)
-    return lambda: write_windows(os.path.join(folder.name, "windows.parquet"), plan, made), num_windows
+    return lambda: write_windows(
+        os.path.join(folder.name, "windows.parquet"), plan, made
+    ), num_windows
 
 
 def matrix_product() -> Work:

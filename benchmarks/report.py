@@ -5,12 +5,21 @@ from collections.abc import Sequence
 
 def line_of(row: dict) -> str:
     """Formats a row for the terminal."""
-    return "  ".join(f"{cell:{width}}" for cell, width in zip(_cells(row), (50, 10, 24, 22, 16, 0), strict=True))
+    return "  ".join(
+        f"{cell:{width}}" for cell, width in zip(_cells(row), (50, 10, 24, 22, 16, 0), strict=True)
+    )
 
 
 def speed_table(rows: Sequence[dict]) -> str:
     """Formats rows as a table in Markdown."""
-    header = ("work", "enhsim_tf", "compared with", "ratio of times: median (range)", "target", "reached")
+    header = (
+        "work",
+        "enhsim_tf",
+        "compared with",
+        "ratio of times: median (range)",
+        "target",
+        "reached",
+    )
     lines = [header, ["---"] * len(header), *map(_cells, rows)]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 

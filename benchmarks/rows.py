@@ -14,28 +14,48 @@ import numpy as np
 from benchmarks.worker import Worker
 
 REPETITIONS = 7
-LAYERS = ((500, 500), (500, 3_200), (3_200, 3_200), (3_200, 500))  # inputs and outputs of each layer of the enhancer
+LAYERS = (
+    (500, 500),
+    (500, 3_200),
+    (3_200, 3_200),
+    (3_200, 500),
+)  # inputs and outputs of each layer of the enhancer
 PARAMETERS = sum(inputs * outputs + outputs for inputs, outputs in LAYERS)
-TRAFFIC = 10 * 4 * PARAMETERS  # bytes of a step: weights are read twice, gradients written once; Adam reads four arrays and writes three
-WINDOW_FLOP = 2 * sum(inputs * outputs for inputs, outputs in LAYERS)  # operations of the enhancer for one window
+TRAFFIC = (
+    10 * 4 * PARAMETERS
+)  # bytes of a step: weights are read twice, gradients written once; Adam reads four arrays and writes three
+WINDOW_FLOP = 2 * sum(
+    inputs * outputs for inputs, outputs in LAYERS
+)  # operations of the enhancer for one window
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:
     """Returns the median and the range of values."""
-    return {"median": float(np.median(values)), "low": float(min(values)), "high": float(max(values))}
+    return {
+        "median": float(np.median(values)),
+        "low": float(min(values)),
+        "high": float(max(values)),
+    }
 
 
 def in_turns(ways: Mapping[str, Callable[[], float]], repetitions: int) -> dict[str, list[float]]:
     """Calls the functions alternately, and returns the results of each."""
     found = {name: [] for name in ways}
     for repetition in range(repetitions):
-        for name in list(ways)[:: 1 if repetition % 2 else -1]:  # reverses the order each time, so that none always follows the same other
+        for name in list(ways)[
+            :: 1 if repetition % 2 else -1
+        ]:  # reverses the order each time, so that none always follows the same other
             found[name].append(ways[name]())
     return found
 
 
 def compared(
-    work: str, ours: Sequence[float], comparison: str, theirs: Sequence[float], unit: str = "ms", target: float | None = None
+    work: str,
+    ours: Sequence[float],
+    comparison: str,
+    theirs: Sequence[float],
+    unit: str = "ms",
+    target: float | None = None,
 ) -> dict:
     """Returns a row from seconds of ours and of a comparison, one for each repetition, and a target for the median ratio, if there is one."""
     factor = {"ms": 1e3, "s": 1.0}[unit]
@@ -71,16 +91,27 @@ def enhancer() -> Iterator[dict]:
     found = measure(workers)
     for name in ("plain fit", "PyTorch, fused Adam"):
         yield _row(work, workers, found, name, 0.7)
-    yield compared(work, found["ours"], "memory-traffic estimate", [TRAFFIC * each for each in found["floor"]], target=1.3)
+    yield compared(
+        work,
+        found["ours"],
+        "memory-traffic estimate",
+        [TRAFFIC * each for each in found["floor"]],
+        target=1.3,
+    )
 
 
 def gan() -> Iterator[dict]:
     """Benchmarks an iteration of the paper's GAN, with and without dropout."""
-    for work, dropout, targets in (("GAN iteration, dropout 0", 0.0, (0.25, 0.65)), ("GAN iteration, dropout 0.3", 0.3, (0.5, None))):
+    for work, dropout, targets in (
+        ("GAN iteration, dropout 0", 0.0, (0.25, 0.65)),
+        ("GAN iteration, dropout 0.3", 0.3, (0.5, None)),
+    ):
         given = {"num_iterations": 5, "dropout": dropout}
         workers = {
             "ours": Worker("ours", "gan_iteration", **given),
-            "textbook loop": Worker("textbook_gan", "gan_iteration", num_iterations=3, dropout=dropout),
+            "textbook loop": Worker(
+                "textbook_gan", "gan_iteration", num_iterations=3, dropout=dropout
+            ),
             "one tf.function": Worker("keras_plain", "gan_iteration", **given),
         }
         found = measure(workers)
@@ -94,16 +125,26 @@ def generation() -> Iterator[dict]:
     workers = {
         "product": Worker("ours", "matrix_product"),
         "predict": Worker("keras_plain", "enhance_and_noise", **given),
-        **{name: Worker("ours", name, **given) for name in ("enhance_and_noise", "generate", "generate_to_parquet")},
+        **{
+            name: Worker("ours", name, **given)
+            for name in ("enhance_and_noise", "generate", "generate_to_parquet")
+        },
     }
     found = measure(workers)
     product = [WINDOW_FLOP * each for each in found["product"]]
     window = "generation of a window, enhancer + noise"
     yield compared(window, found["enhance_and_noise"], "matrix-product rate", product, target=1.25)
     yield compared(window, found["enhance_and_noise"], "Keras' predict", found["predict"])
-    yield compared("generation of a window, coarse simulator included", found["generate"], "matrix-product rate", product)
+    yield compared(
+        "generation of a window, coarse simulator included",
+        found["generate"],
+        "matrix-product rate",
+        product,
+    )
     window = "generation of a window to Parquet"
-    yield compared(window, found["generate_to_parquet"], "generation in memory", found["generate"], target=1.67)
+    yield compared(
+        window, found["generate_to_parquet"], "generation in memory", found["generate"], target=1.67
+    )
 
 
 def starting() -> Iterator[dict]:
@@ -130,7 +171,13 @@ def _timed(arguments: Sequence[str]) -> Callable[[], float]:
     return run
 
 
-def _row(work: str, workers: Mapping[str, Worker], found: Mapping[str, list[float]], comparison: str, target: float | None) -> dict:
+def _row(
+    work: str,
+    workers: Mapping[str, Worker],
+    found: Mapping[str, list[float]],
+    comparison: str,
+    target: float | None,
+) -> dict:
     """The row of a comparison, which may have been skipped."""
     if skipped := workers[comparison].skipped:
         return {"work": work, "comparison": comparison, "skipped": skipped}

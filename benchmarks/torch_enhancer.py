@@ -16,7 +16,10 @@ def enhancer_step(num_steps: int) -> Work:
     adam = torch.optim.Adam(model.parameters(), lr=0.001, fused=True)
     loss = torch.nn.MSELoss()
     rng = np.random.default_rng(0)
-    source, target = (torch.from_numpy(rng.normal(0, 0.5, (15 * num_steps, WINDOW)).astype(np.float32)) for _ in range(2))
+    source, target = (
+        torch.from_numpy(rng.normal(0, 0.5, (15 * num_steps, WINDOW)).astype(np.float32))
+        for _ in range(2)
+    )
 
     def run() -> None:
         order = torch.randperm(len(source))

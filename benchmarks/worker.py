@@ -47,7 +47,9 @@ class Worker:
     def _answer(self) -> dict:
         line = self._process.stdout.readline()
         if not line:
-            raise RuntimeError(f"Expected an answer. Received: none from {' '.join(self._process.args[2:])}. Run that command by hand.")
+            raise RuntimeError(
+                f"Expected an answer. Received: none from {' '.join(self._process.args[2:])}. Run that command by hand."
+            )
         return json.loads(line)
 
 
@@ -56,7 +58,9 @@ def main(module: str, function: str, settings: str) -> None:
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # output of libraries must not mix with the answers
     try:
-        run, units = getattr(importlib.import_module(f"benchmarks.{module}"), function)(**json.loads(settings))
+        run, units = getattr(importlib.import_module(f"benchmarks.{module}"), function)(
+            **json.loads(settings)
+        )
     except ImportError as error:
         answers.write(json.dumps({"skipped": str(error)}) + "\n")
         return
@@ -65,7 +69,9 @@ def main(module: str, function: str, settings: str) -> None:
     for _ in sys.stdin:
         began = time.perf_counter()
         timed = run()
-        seconds = timed if isinstance(timed, float) else time.perf_counter() - began  # some works measure their own time
+        seconds = (
+            timed if isinstance(timed, float) else time.perf_counter() - began
+        )  # some works measure their own time
         answers.write(json.dumps({"seconds": seconds / units}) + "\n")
 
 

@@ -21,17 +21,33 @@ def main(arguments: list[str] | None = None) -> int:
         description="Builds the book from the notebooks (with their stored outputs), the pages and the docstrings. "
         'It needs `python -m pip install ".[book]"` and no network.',
     )
-    parser.add_argument("--out", type=Path, default=ROOT / "build" / "book", help="folder of the pages (default: build/book)")
-    parser.add_argument("--tables", action="store_true", help="refresh the marked tables of README.md and docs/, and build nothing")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=ROOT / "build" / "book",
+        help="folder of the pages (default: build/book)",
+    )
+    parser.add_argument(
+        "--tables",
+        action="store_true",
+        help="refresh the marked tables of README.md and docs/, and build nothing",
+    )
     options = parser.parse_args(arguments)
     if options.tables:
         from book.tables import refresh
 
         print(*refresh(ROOT), sep="\n")
         return 0
-    missing = [name for name in ("sphinx", "myst_nb", "sphinx_book_theme", "sphinx_external_toc") if importlib.util.find_spec(name) is None]
+    missing = [
+        name
+        for name in ("sphinx", "myst_nb", "sphinx_book_theme", "sphinx_external_toc")
+        if importlib.util.find_spec(name) is None
+    ]
     if missing:
-        print(f'Expected the packages of the book. Missing: {", ".join(missing)}. Run `python -m pip install ".[book]"`.', file=sys.stderr)
+        print(
+            f'Expected the packages of the book. Missing: {", ".join(missing)}. Run `python -m pip install ".[book]"`.',
+            file=sys.stderr,
+        )
         return 2
     return build(options.out)
 
@@ -43,7 +59,21 @@ def build(out: Path) -> int:
     if (out / "objects.inv").is_file():  # an earlier book, of which no page may stay behind
         shutil.rmtree(out)
     with tempfile.TemporaryDirectory() as kept:
-        code = sphinx(["-b", "html", "-c", str(ROOT / "book"), "-d", kept, "-q", "-W", "--keep-going", str(ROOT), str(out)])
+        code = sphinx(
+            [
+                "-b",
+                "html",
+                "-c",
+                str(ROOT / "book"),
+                "-d",
+                kept,
+                "-q",
+                "-W",
+                "--keep-going",
+                str(ROOT),
+                str(out),
+            ]
+        )
     print(out / "index.html")
     return code
 

@@ -15,14 +15,26 @@ from enhsim_tf import __version__  # noqa: E402
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-project, author, copyright = "enhsim_tf", "The enhsim_tf authors", "The enhsim_tf authors, Apache-2.0"  # noqa: A001
+project, author, copyright = (
+    "enhsim_tf",
+    "The enhsim_tf authors",
+    "The enhsim_tf authors, Apache-2.0",
+)  # noqa: A001
 release = __version__
-extensions = ["myst_nb", "sphinx_external_toc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_nb",
+    "sphinx_external_toc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+]
 include_patterns = ["*.md", "book/**", "docs/*.md", "notebooks/*.ipynb", "studies/**.md"]
 external_toc_path = str(ROOT / "book" / "_toc.yml")
 suppress_warnings = ["etoc.toctree"]  # the toctrees of autosummary are beside the table of contents
 
-nb_execution_mode = "off"  # the stored outputs are those of the full budget; `python -m notebooks.build` makes them
+nb_execution_mode = (
+    "off"  # the stored outputs are those of the full budget; `python -m notebooks.build` makes them
+)
 nb_ipywidgets_js: dict[str, dict] = {}  # the default loads two scripts from the network
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

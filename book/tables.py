@@ -24,7 +24,10 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?")
 
 def refresh(root: Path) -> list[Path]:
     """Writes each table between its markers on the pages of a clone, and returns the pages."""
-    texts = {path: path.read_text(encoding="utf-8") for path in {root / page for page, _ in TABLES.values()}}
+    texts = {
+        path: path.read_text(encoding="utf-8")
+        for path in {root / page for page, _ in TABLES.values()}
+    }
     for name, (page, table) in TABLES.items():
         texts[root / page] = fill_part(texts[root / page], name, table(root), page)
     for path, text in texts.items():
@@ -45,8 +48,12 @@ def agree(old: str, new: str) -> bool:
     """Whether two texts have the same words, and numbers that differ by at most `TOLERANCE`."""
     if _NUMBER.sub("#", old) != _NUMBER.sub("#", new):
         return False
-    numbers = ([float(number.replace(",", "")) for number in _NUMBER.findall(text)] for text in (old, new))
-    return all(math.isclose(*pair, rel_tol=TOLERANCE, abs_tol=0.02) for pair in zip(*numbers, strict=True))
+    numbers = (
+        [float(number.replace(",", "")) for number in _NUMBER.findall(text)] for text in (old, new)
+    )
+    return all(
+        math.isclose(*pair, rel_tol=TOLERANCE, abs_tol=0.02) for pair in zip(*numbers, strict=True)
+    )
 
 
 def fill_part(text: str, name: str, content: str, where: str) -> str:
@@ -54,14 +61,23 @@ def fill_part(text: str, name: str, content: str, where: str) -> str:
     marked = re.compile(rf"(<!-- {name}: generated -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
     text, count = marked.subn(lambda match: f"{match[1]}{content}\n{match[2]}", text)
     if count != 1:
-        raise InputError(f"Expected the markers of '{name}' once in {where}. Received: {count}. Put them back.")
+        raise InputError(
+            f"Expected the markers of '{name}' once in {where}. Received: {count}. Put them back."
+        )
     return text
 
 
 def verdicts(root: Path) -> str:
     """The claims of the README, each with its published verdict and the verdicts of the runs."""
-    published = json.loads((root / "enhsim_tf" / "paper" / "published.json").read_text(encoding="utf-8"))["claims"]
-    short = {claim["id"]: claim["short"] for claim in json.loads((root / "figures" / "results.json").read_text(encoding="utf-8"))["claims"]}
+    published = json.loads(
+        (root / "enhsim_tf" / "paper" / "published.json").read_text(encoding="utf-8")
+    )["claims"]
+    short = {
+        claim["id"]: claim["short"]
+        for claim in json.loads((root / "figures" / "results.json").read_text(encoding="utf-8"))[
+            "claims"
+        ]
+    }
     rows = []
     for id, each in published.items():
         rows.append((f"{id} {short[id]}", each["verdict"], "/".join(map(str, each["runs"]))))
@@ -77,12 +93,16 @@ def measurements(root: Path) -> str:
     reference = table[table["reading"] == "reference"]
     rows, words = [], {OURS: "({})", WHOLE: "{} for *reproduced*"}
     for claim in CLAIMS:
-        runs = reference[reference["claim"] == claim.id].pivot(index=["rounding", "seed"], columns="name", values="value")
+        runs = reference[reference["claim"] == claim.id].pivot(
+            index=["rounding", "seed"], columns="name", values="value"
+        )
         for name, group in itertools.groupby(claim.limits, lambda limit: limit.name):
             limits, values, asked, kept = list(group), runs[name], [], []
             for limit in limits:
                 ends = {"low": limit.low, "high": limit.upper(runs.median())}
-                range_words = needed({end: None if math.isinf(value) else value for end, value in ends.items()})
+                range_words = needed(
+                    {end: None if math.isinf(value) else value for end, value in ends.items()}
+                )
                 asked.append(words.get(limit.decides, "{}").format(range_words))
                 kept.append(str(sum(map(limit.holds, runs.to_dict("records")))))
             found = f"{short(values.median())} ({short(values.min())} to {short(values.max())})"
@@ -108,7 +128,13 @@ def settings_table(root: Path) -> str:
     from enhsim_tf.paper.report import decisions  # with the networks, TensorFlow
 
     rows = [
-        (f"`{row['setting']}`", row["value"], row["paper"], row["author"], ": ".join(filter(None, (row["source"], row["why"]))))
+        (
+            f"`{row['setting']}`",
+            row["value"],
+            row["paper"],
+            row["author"],
+            ": ".join(filter(None, (row["source"], row["why"]))),
+        )
         for row in decisions()
     ]
     return markdown(("setting", "here", "paper", "author's code", "source: reason"), rows)
@@ -116,12 +142,16 @@ def settings_table(root: Path) -> str:
 
 def speed(root: Path) -> str:
     """The table of the benchmarks."""
-    return speed_table(json.loads((root / "benchmarks" / "results.json").read_text(encoding="utf-8"))["rows"])
+    return speed_table(
+        json.loads((root / "benchmarks" / "results.json").read_text(encoding="utf-8"))["rows"]
+    )
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Formats a table."""
-    return "\n".join("| " + " | ".join(row) + " |" for row in (header, ["---"] * len(header), *rows))
+    return "\n".join(
+        "| " + " | ".join(row) + " |" for row in (header, ["---"] * len(header), *rows)
+    )
 
 
 TABLES: dict[str, tuple[str, Callable[[Path], str]]] = {

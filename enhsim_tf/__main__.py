@@ -15,7 +15,9 @@ def main(arguments: list[str] | None = None) -> int:
 
     def run() -> int:
         options = check(parse(arguments))
-        module = importlib.import_module(f"enhsim_tf.cli.{options.command}")  # only now, because its imports are slow
+        module = importlib.import_module(
+            f"enhsim_tf.cli.{options.command}"
+        )  # only now, because its imports are slow
         return getattr(module, f"run_{options.command}")(options)
 
     return run_command(run, "interrupted; what was finished is kept")

@@ -17,7 +17,10 @@ from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.series import check_values
 from enhsim_tf.telemetry.sources import read_source
 
-_FEW, _NUM_OVERLAPPING = 20, 200  # with fewer disjoint windows in a part, so many overlapping ones are compared
+_FEW, _NUM_OVERLAPPING = (
+    20,
+    200,
+)  # with fewer disjoint windows in a part, so many overlapping ones are compared
 
 
 class OwnChannel(Pipeline):
@@ -39,7 +42,15 @@ class OwnChannel(Pipeline):
 
     is_example = False
 
-    def __init__(self, settings: Settings, stages: Stages, store: Store | None, path: Path, column: str | None, time: str | None):
+    def __init__(
+        self,
+        settings: Settings,
+        stages: Stages,
+        store: Store | None,
+        path: Path,
+        column: str | None,
+        time: str | None,
+    ):
         super().__init__(settings, stages, store)
         cleaned = _clean(path, column, time)
         for line in cleaned.report.lines():
@@ -47,7 +58,10 @@ class OwnChannel(Pipeline):
         (read,) = cleaned.parts
         wave = SquareWaveSimulator.fit(read.part(0, len(read) // 2))
         offset, scale = level_offset_and_scale(wave)
-        values, start = ((read.values - offset) / scale).astype(np.float32), (read.start or START).replace("+00:00", "Z")
+        values, start = (
+            ((read.values - offset) / scale).astype(np.float32),
+            (read.start or START).replace("+00:00", "Z"),
+        )
         self.own = Telemetry(values, read.interval_s, start, printable(path.stem))
         self.simulator = lambda time: (wave(time + read.offset_s) - offset) / scale
         self.truth = lambda time: values[np.rint(time / read.interval_s).astype(int)]
@@ -56,7 +70,11 @@ class OwnChannel(Pipeline):
     @property
     def telemetry_settings(self) -> dict[str, Any]:
         """What the telemetry depends on."""
-        return {"name": self.own.name, "checksum": zlib.crc32(self.own.values.tobytes()), "interval": self.own.interval}
+        return {
+            "name": self.own.name,
+            "checksum": zlib.crc32(self.own.values.tobytes()),
+            "interval": self.own.interval,
+        }
 
     def new_telemetry(self) -> Telemetry:
         """The telemetry before it is placed in the store."""
@@ -64,14 +82,18 @@ class OwnChannel(Pipeline):
 
     def _starts(self, num_samples: int, number: int | None, purpose: str) -> np.ndarray:
         if number is None and num_samples < _FEW * self.settings.window:
-            return np.unique(np.linspace(0, num_samples - self.settings.window, _NUM_OVERLAPPING).astype(int))
+            return np.unique(
+                np.linspace(0, num_samples - self.settings.window, _NUM_OVERLAPPING).astype(int)
+            )
         return super()._starts(num_samples, number, purpose)
 
     def _noise_unit(self) -> np.float32:
         """The unit in which the noise has the standard deviation 0.1, as that of the paper's example."""
         for name, part in self.parts.items():
             noise = np.std(self.noise_windows(name), dtype=np.float64)
-            if not noise > 1e-5 * np.std(part.values, dtype=np.float64):  # 32-bit telemetry resolves no less
+            if not noise > 1e-5 * np.std(
+                part.values, dtype=np.float64
+            ):  # 32-bit telemetry resolves no less
                 raise InputError(
                     f"Expected noise around the moving average of {self.own.name}. Received: none in its {name} part. Choose another channel."
                 )
@@ -81,10 +103,14 @@ class OwnChannel(Pipeline):
 def _clean(path: Path, column: str | None, time: str | None) -> Cleaned:
     """Reads and cleans the channel; raises an `InputError` if there are several, or if it has several parts or is constant."""
     cleaning = Cleaning(time_format="s")
-    channels = read_source(path, None if column is None else [column], NO_TIME if time is None else time, cleaning)
+    channels = read_source(
+        path, None if column is None else [column], NO_TIME if time is None else time, cleaning
+    )
     if len(channels) > 1:
         known = ", ".join(list(channels)[:8])
-        raise InputError(f"Expected one column. Received: {len(channels)} in {path.name} ({known}). Name one with --column.")
+        raise InputError(
+            f"Expected one column. Received: {len(channels)} in {path.name} ({known}). Name one with --column."
+        )
     (series,) = channels.values()
     cleaned = clean(series.rename(f"{series.name} of {path.name}"), cleaning)
     if len(cleaned.parts) > 1:

@@ -18,15 +18,21 @@ class InfluxTelemetry:
 
     def __init__(self, place: str):
         if place != "influxdb" and not place.startswith("influxdb://"):
-            raise InputError(f"Expected --store parquet, influxdb or influxdb://bucket/measurement/field. Received: --store {place}.")
-        self.location = parse_location("influxdb://telemetry/enhsim_tf/value" if place == "influxdb" else place)
+            raise InputError(
+                f"Expected --store parquet, influxdb or influxdb://bucket/measurement/field. Received: --store {place}."
+            )
+        self.location = parse_location(
+            "influxdb://telemetry/enhsim_tf/value" if place == "influxdb" else place
+        )
         InfluxStore(self.location).check()
 
     def write(self, telemetry: "Telemetry") -> None:
         """Places a series, with a tag that is the checksum of its content, so that other series at the place stay apart."""
         self.written, self.times = telemetry, telemetry.stamps.as_unit("ns").asi8
         content = f"{zlib.crc32(self.times.tobytes() + telemetry.values.tobytes()):08x}"
-        self.store = InfluxStore(dataclasses.replace(self.location, tags=(*self.location.tags, ("run", content))))
+        self.store = InfluxStore(
+            dataclasses.replace(self.location, tags=(*self.location.tags, ("run", content)))
+        )
         self.store.write(self.times, telemetry.values)
 
     def read(self) -> "Telemetry":

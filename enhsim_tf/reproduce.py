@@ -33,21 +33,60 @@ exit code: 0 every measurement with a limit lies within its published range, 1 o
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """Reads the command line without slow imports."""
     form = argparse.RawDescriptionHelpFormatter
-    parser = Parser(prog=PROGRAM, description="Reproduces Feldman 2020, end to end.", epilog=EXAMPLES, formatter_class=form)
-    parser.add_argument("--budget", choices=("smoke", "full"), default="full", help="size of the run (default: full)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of all random draws (default: 0)")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="changes a setting; may be repeated")
-    figures = [f"fig{number:02}" for number in range(1, 15)]
-    parser.add_argument("--only", choices=figures, metavar="FIGURE", help="draws one figure, for example fig04, and evaluates no claim")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="output folder (default: figures; another one for other runs than the published)"
+    parser = Parser(
+        prog=PROGRAM,
+        description="Reproduces Feldman 2020, end to end.",
+        epilog=EXAMPLES,
+        formatter_class=form,
     )
-    parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of finished stages (default: .cache, or ENHSIM_TF_CACHE)")
+    parser.add_argument(
+        "--budget",
+        choices=("smoke", "full"),
+        default="full",
+        help="size of the run (default: full)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of all random draws (default: 0)")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="changes a setting; may be repeated",
+    )
+    figures = [f"fig{number:02}" for number in range(1, 15)]
+    parser.add_argument(
+        "--only",
+        choices=figures,
+        metavar="FIGURE",
+        help="draws one figure, for example fig04, and evaluates no claim",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="output folder (default: figures; another one for other runs than the published)",
+    )
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="folder of finished stages (default: .cache, or ENHSIM_TF_CACHE)",
+    )
     parser.add_argument("--fresh", action="store_true", help="makes all stages again")
-    parser.add_argument("--telemetry", type=Path, metavar="PATH", help="runs the pipeline on a real channel: .npy, .csv or .parquet")
+    parser.add_argument(
+        "--telemetry",
+        type=Path,
+        metavar="PATH",
+        help="runs the pipeline on a real channel: .npy, .csv or .parquet",
+    )
     parser.add_argument("--column", help="its column with the values")
     parser.add_argument("--time", help="its column with the timestamps")
-    parser.add_argument("--store", default="parquet", metavar="STORE", help="parquet, influxdb, or influxdb://bucket/measurement/field")
+    parser.add_argument(
+        "--store",
+        default="parquet",
+        metavar="STORE",
+        help="parquet, influxdb, or influxdb://bucket/measurement/field",
+    )
     return parser.parse_args(arguments)
 
 
@@ -58,7 +97,9 @@ def read_settings(options: argparse.Namespace) -> "Settings":
     pairs = [text.partition("=") for text in options.set]
     if wrong := [name for name, equals, value in pairs if not (equals and value)]:
         raise InputError(f"Expected --set NAME=VALUE. Received: --set {wrong[0]}.")
-    return make_settings(options.budget, seed=options.seed, **{name: value for name, _, value in pairs})
+    return make_settings(
+        options.budget, seed=options.seed, **{name: value for name, _, value in pairs}
+    )
 
 
 def choose_folder(options: argparse.Namespace) -> Path:
@@ -68,8 +109,14 @@ def choose_folder(options: argparse.Namespace) -> Path:
         default = f"{default}_{options.telemetry.stem}"
     elif options.set:
         default = f"{default}_changed"
-    if options.out is not None and options.budget == "smoke" and options.out.resolve() == Path("figures").resolve():
-        raise InputError("Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures.")
+    if (
+        options.out is not None
+        and options.budget == "smoke"
+        and options.out.resolve() == Path("figures").resolve()
+    ):
+        raise InputError(
+            "Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures."
+        )
     return options.out or Path(default)
 
 
@@ -77,7 +124,9 @@ def run(options: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
     began = time.perf_counter()
     if options.telemetry is None and (options.column or options.time):
-        raise InputError("Expected --column and --time together with --telemetry. Received: one of them alone.")
+        raise InputError(
+            "Expected --column and --time together with --telemetry. Received: one of them alone."
+        )
     settings, folder = read_settings(options), choose_folder(options)
     store = None
     if options.store != "parquet":
@@ -99,7 +148,9 @@ def run(options: argparse.Namespace) -> int:
     else:
         from enhsim_tf.own_channel import OwnChannel
 
-        pipeline = OwnChannel(settings, stages, store, options.telemetry, options.column, options.time)
+        pipeline = OwnChannel(
+            settings, stages, store, options.telemetry, options.column, options.time
+        )
     for name in sorted(FIGURES, key=lambda name: name[:5] in TRAINED):
         if options.only in (None, name[:5]):
             save_figure(name, pipeline, folder, foot_of(options, name), options.budget == "smoke")
@@ -116,8 +167,12 @@ def run(options: argparse.Namespace) -> int:
     found = results(records, title(records), settings, published, **about)
     write_json(folder / "results.json", found)
     tell(f"\n{as_text(found['box'])}\n")
-    tell(f"published {published['title']} (in brackets: runs reproduced/partly/not)   this run {found['title']}   {about['seconds']:.0f} s")
-    tell(f"figures, results.json and the whole run on one page: {write_page(folder, found, settings)}")
+    tell(
+        f"published {published['title']} (in brackets: runs reproduced/partly/not)   this run {found['title']}   {about['seconds']:.0f} s"
+    )
+    tell(
+        f"figures, results.json and the whole run on one page: {write_page(folder, found, settings)}"
+    )
     return conclude(options, outside(records, published))
 
 
@@ -125,14 +180,23 @@ def foot_of(options: argparse.Namespace, figure: str) -> str:
     """The foot of a figure: what this run differs in from others, and the command for this figure."""
     source = [] if options.telemetry is None else [options.telemetry.name]
     store = [] if options.store == "parquet" else [f"store {options.store}"]
-    about = [f"seed {options.seed}", f"{options.budget} budget", *options.set, *source, *store, f"{PROGRAM} --only {figure.split('_')[0]}"]
+    about = [
+        f"seed {options.seed}",
+        f"{options.budget} budget",
+        *options.set,
+        *source,
+        *store,
+        f"{PROGRAM} --only {figure.split('_')[0]}",
+    ]
     return printable(" · ".join(about))
 
 
 def conclude(options: argparse.Namespace, different: list[str]) -> int:
     """Tells how the measurements compare with the published ranges, and returns the exit code."""
     if options.budget == "smoke" or options.telemetry or options.set:
-        tell("Published verdicts are those of the reference on the paper's example at full budget; this run is another one.")
+        tell(
+            "Published verdicts are those of the reference on the paper's example at full budget; this run is another one."
+        )
         return 0
     for line in different:
         tell(f"outside the published range: {line}")
@@ -141,7 +205,10 @@ def conclude(options: argparse.Namespace, different: list[str]) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command. An error of the user is reported as one line, with exit code 2."""
-    return run_command(lambda: run(parse(arguments)), "interrupted; finished stages are kept, and the next run continues after them")
+    return run_command(
+        lambda: run(parse(arguments)),
+        "interrupted; finished stages are kept, and the next run continues after them",
+    )
 
 
 if __name__ == "__main__":

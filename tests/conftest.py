@@ -17,15 +17,28 @@ if (
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports TensorFlow
-os.environ.setdefault("TF_ENABLE_ONEDNN_OPTS", "1")  # as in `common.backend`, also for tests that import Keras directly
-for threads in ("TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(threads, "1")  # two test processes run at a time, and waiting threads would also use CPU time
+os.environ.setdefault(
+    "TF_ENABLE_ONEDNN_OPTS", "1"
+)  # as in `common.backend`, also for tests that import Keras directly
+for threads in (
+    "TF_NUM_INTRAOP_THREADS",
+    "TF_NUM_INTEROP_THREADS",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+):
+    os.environ.setdefault(
+        threads, "1"
+    )  # two test processes run at a time, and waiting threads would also use CPU time
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 SLOW = "--slow"
-TOGETHER = ("paper", "simulator")  # folders whose files share fixtures that take seconds: a process runs all of a folder
+TOGETHER = (
+    "paper",
+    "simulator",
+)  # folders whose files share fixtures that take seconds: a process runs all of a folder
 LEFT = pytest.StashKey[int]()
 
 
@@ -44,7 +57,11 @@ def pytest_collection_modifyitems(config, items):
             config.workeroutput["left"] = len(left)
     for item in items:
         folder = item.path.parent.name
-        item.add_marker(pytest.mark.xdist_group(folder if folder in TOGETHER else item.nodeid.partition("::")[0]))
+        item.add_marker(
+            pytest.mark.xdist_group(
+                folder if folder in TOGETHER else item.nodeid.partition("::")[0]
+            )
+        )
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -55,7 +72,9 @@ def pytest_testnodedown(node):
 
 def pytest_terminal_summary(terminalreporter, config):
     if left := config.stash.get(LEFT, 0):
-        terminalreporter.write_line(f"{left} slow tests were left out. To run them: python -m pytest {SLOW} -m slow")
+        terminalreporter.write_line(
+            f"{left} slow tests were left out. To run them: python -m pytest {SLOW} -m slow"
+        )
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -81,7 +100,9 @@ def narrow_enhancer():
     from enhsim_tf.enhancer import candidates
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(candidates, "Settings", functools.partial(candidates.Settings, hidden_units=256))
+        patch.setattr(
+            candidates, "Settings", functools.partial(candidates.Settings, hidden_units=256)
+        )
         yield
 
 
@@ -106,7 +127,11 @@ def refused():
 def pretended(monkeypatch):
     """Environment variables that name a server of InfluxDB that does not exist."""
     pytest.importorskip("influxdb_client")
-    for name, value in {"URL": "http://127.0.0.1:9", "TOKEN": "token-0123456789abcdef==", "ORG": "nobody"}.items():
+    for name, value in {
+        "URL": "http://127.0.0.1:9",
+        "TOKEN": "token-0123456789abcdef==",
+        "ORG": "nobody",
+    }.items():
         monkeypatch.setenv(f"INFLUXDB_V2_{name}", value)
 
 

@@ -21,12 +21,22 @@ def unchanged(window: int, number: int = 1, gain: float = 1.0) -> Enhancer:
     """
     main = np.arange(number), np.full(number, gain, np.float32)
     return Enhancer(
-        "level and gain", window, number, number, np.zeros(number, np.float32), np.zeros(window * number, np.float32), main=main
+        "level and gain",
+        window,
+        number,
+        number,
+        np.zeros(number, np.float32),
+        np.zeros(window * number, np.float32),
+        main=main,
     )
 
 
 def of_waves(
-    waves: Sequence[SquareWaveSimulator], window: int, noise_sd: float = 0.1, interval_s: float = 1.0, **others
+    waves: Sequence[SquareWaveSimulator],
+    window: int,
+    noise_sd: float = 0.1,
+    interval_s: float = 1.0,
+    **others,
 ) -> EnhancedSimulator:
     """A simulator whose telemetry are the waves themselves plus white noise.
 
@@ -41,7 +51,9 @@ def of_waves(
     given = {
         "alignment": Waves(waves, channels, interval_s, window),
         "enhancer": unchanged(window, len(waves)),
-        "noise": WindowBootstrap(noise_sd * np.random.default_rng(9).standard_normal((500, window, len(waves)))),
+        "noise": WindowBootstrap(
+            noise_sd * np.random.default_rng(9).standard_normal((500, window, len(waves)))
+        ),
         "levels": np.array([[level_offset_and_scale(each) for each in waves]]),
         "trained": {"seed": 0},
     }

@@ -20,7 +20,12 @@ from enhsim_tf.datasets.labelled_windows import Plan, ShardMaker  # noqa: E402
 from enhsim_tf.datasets.places import ScenarioRange  # noqa: E402
 from tests.known_simulators import of_waves  # noqa: E402
 
-COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
+COARSE = SquareWaveSimulator(
+    [
+        SquareWave(480, low=-0.5, high=0.5),
+        SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25),
+    ]
+)
 WINDOW, INTERVAL_S = 60, 2.0
 SCENARIOS = (ScenarioRange("stuck", (0.2, 0.9), (0.0, 0.5)), ScenarioRange("gain_loss", (0.5, 0.5)))
 
@@ -47,7 +52,18 @@ class SlowMaker(PlainMaker):
 
 def plan(num_windows=1_000, shard=50, seed=3, scenarios=SCENARIOS, nominal=0.5, checksum="0" * 64):
     nominal = nominal if scenarios else 1.0
-    return Plan(scenarios, nominal, Path("nowhere"), checksum, WINDOW, INTERVAL_S, ("volts",), seed, num_windows, shard)
+    return Plan(
+        scenarios,
+        nominal,
+        Path("nowhere"),
+        checksum,
+        WINDOW,
+        INTERVAL_S,
+        ("volts",),
+        seed,
+        num_windows,
+        shard,
+    )
 
 
 def die_at_thirteen(number):
@@ -72,7 +88,9 @@ def threads_of(number):
     """Thread counts of a process: those of TensorFlow and of linear algebra."""
     import threadpoolctl
 
-    return os.environ["TF_NUM_INTRAOP_THREADS"], {library["num_threads"] for library in threadpoolctl.threadpool_info()}
+    return os.environ["TF_NUM_INTRAOP_THREADS"], {
+        library["num_threads"] for library in threadpoolctl.threadpool_info()
+    }
 
 
 def refuse(number):
@@ -86,7 +104,9 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("out")
     parser.add_argument("--limit", type=int, help="bytes that a file may have")
-    parser.add_argument("--user", type=int, help="whose rights to have, once everything is imported")
+    parser.add_argument(
+        "--user", type=int, help="whose rights to have, once everything is imported"
+    )
     options = parser.parse_args()
     if options.user:
         os.seteuid(options.user)

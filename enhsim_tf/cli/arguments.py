@@ -25,7 +25,10 @@ python -m enhsim_tf.reproduce, reproduces the paper.
 """
 DETECTORS = tuple(map(registry.option_name, (registry.RESIDUAL, *registry.DETECTORS)))
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
-_OWN, _MODELS = "your own simulator", "output folder of `fit`"  # the title of a group of options, and the help text of MODEL_DIR
+_OWN, _MODELS = (
+    "your own simulator",
+    "output folder of `fit`",
+)  # the title of a group of options, and the help text of MODEL_DIR
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -44,7 +47,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"enhsim-tf {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,update,inject}", required=True)
+    commands = parser.add_subparsers(
+        dest="command", metavar="{fit,generate,verify,score,update,inject}", required=True
+    )
     for add in (_add_fit, _add_generate, _add_verify, _add_score, _add_update, _add_inject):
         add(commands)
     options = parser.parse_args(arguments)
@@ -53,9 +58,17 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     return options
 
 
-def _command(commands: argparse._SubParsersAction, name: str, short: str, description: str | None = None, epilog: str = ""):  # noqa: ANN202
+def _command(
+    commands: argparse._SubParsersAction,
+    name: str,
+    short: str,
+    description: str | None = None,
+    epilog: str = "",
+):  # noqa: ANN202
     form = argparse.RawDescriptionHelpFormatter
-    return commands.add_parser(name, help=short, description=description, epilog=epilog + EXIT, formatter_class=form)
+    return commands.add_parser(
+        name, help=short, description=description, epilog=epilog + EXIT, formatter_class=form
+    )
 
 
 def _add_fit(commands: argparse._SubParsersAction) -> None:
@@ -68,13 +81,30 @@ def _add_fit(commands: argparse._SubParsersAction) -> None:
         "report evaluates the simulator on it.",
     )
     _add_source(fit)
-    fit.add_argument("--out", type=Path, required=True, metavar="MODEL_DIR", help="output folder, one subfolder for each simulator")
-    fit.add_argument("--separately", action="store_true", help="fit each channel on its own (default: all channels in one simulator)")
+    fit.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="MODEL_DIR",
+        help="output folder, one subfolder for each simulator",
+    )
+    fit.add_argument(
+        "--separately",
+        action="store_true",
+        help="fit each channel on its own (default: all channels in one simulator)",
+    )
     add_options(fit, FitOptions, "window", "enhancer", "noise", "held_out", "num_windows", "epochs")
     _add_workers(fit, "with --separately: channels fitted in parallel")
-    coarse = fit.add_argument_group(_OWN, "fit with a recorded run of your simulator at the times of the telemetry (docs/own_simulator.md)")
+    coarse = fit.add_argument_group(
+        _OWN,
+        "fit with a recorded run of your simulator at the times of the telemetry (docs/own_simulator.md)",
+    )
     _add_coarse(coarse)
-    _add_repeated(coarse, "--coarse-column", "use only this column of the recorded run (default: all numeric columns)")
+    _add_repeated(
+        coarse,
+        "--coarse-column",
+        "use only this column of the recorded run (default: all numeric columns)",
+    )
     add_options(coarse, FitOptions, "delay_s")
     _add_json(fit)
     _add_seed(fit)
@@ -93,31 +123,61 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
     generate.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
     how_many = generate.add_mutually_exclusive_group()
     how_many.add_argument("--windows", type=int, metavar="N", help="total number of windows")
-    how_many.add_argument("--continuous", metavar="LENGTH", help="length of one continuous series, such as 1d, 6h, 90min or 5000 (samples)")
-    generate.add_argument("--start", metavar="TIME", help="start of the series, such as 2024-01-01 (default: times are seconds from 0)")
-    what = (
-        "a degraded mode, such as stuck:0.5, of all channels or of one; for ranges such as stuck:0.2-0.8:0.1-0.9, each window draws its own"
+    how_many.add_argument(
+        "--continuous",
+        metavar="LENGTH",
+        help="length of one continuous series, such as 1d, 6h, 90min or 5000 (samples)",
     )
+    generate.add_argument(
+        "--start",
+        metavar="TIME",
+        help="start of the series, such as 2024-01-01 (default: times are seconds from 0)",
+    )
+    what = "a degraded mode, such as stuck:0.5, of all channels or of one; for ranges such as stuck:0.2-0.8:0.1-0.9, each window draws its own"
     _add_repeated(generate, "--scenario", what, "[CHANNEL=]MODE:SEVERITY[:ONSET]", [])
-    series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
-    series.add_argument("--number", type=int, metavar="N", help="number of events at random places; the scenarios are used in turn")
+    series = generate.add_argument_group(
+        "events in a series", "with --continuous; each event is followed by nominal operation"
+    )
+    series.add_argument(
+        "--number",
+        type=int,
+        metavar="N",
+        help="number of events at random places; the scenarios are used in turn",
+    )
     _add_events(series, "event", "MODE", "stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h")
-    generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
+    generate.add_argument(
+        "--nominal-share",
+        type=float,
+        metavar="SHARE",
+        help="share of nominal windows, with --scenario (default: 0.5)",
+    )
     _add_repeated(generate, "--channel", "only the simulator of this name")
     out = "a .parquet file (a series may be a .csv file), or a folder for several simulators"
     generate.add_argument("--out", type=Path, required=True, metavar="OUT", help=out)
-    coarse = generate.add_argument_group(_OWN, "for models that were fitted with --coarse (docs/own_simulator.md)")
+    coarse = generate.add_argument_group(
+        _OWN, "for models that were fitted with --coarse (docs/own_simulator.md)"
+    )
     _add_coarse(coarse)
-    coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with different noise (default: 1)")
+    coarse.add_argument(
+        "--copies",
+        type=int,
+        metavar="N",
+        help="copies of the run, each with different noise (default: 1)",
+    )
     _add_cleaning(coarse)
-    large = generate.add_argument_group("large data sets", "with these options, OUT is a folder of many files (docs/large_data_sets.md)")
+    large = generate.add_argument_group(
+        "large data sets",
+        "with these options, OUT is a folder of many files (docs/large_data_sets.md)",
+    )
     _add_workers(large, "number of worker processes", None)
     _add_seed(generate)
 
 
 def _add_verify(commands: argparse._SubParsersAction) -> None:
     verify = _command(commands, "verify", "verify a large data set against its manifest")
-    verify.add_argument("folder", type=Path, metavar="FOLDER", help="output folder of `generate --workers`")
+    verify.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="output folder of `generate --workers`"
+    )
     verify.set_defaults(seed=0)
 
 
@@ -139,10 +199,31 @@ def _add_score(commands: argparse._SubParsersAction) -> None:
     score.add_argument("--detector", choices=DETECTORS, metavar="NAME", help=what)
     add_options(score, ScoreOptions, "false_alarm_rate")
     what = "generated windows from which the detector learns (default: %(default)s)"
-    score.add_argument("--windows", dest="num_windows", type=int, default=ScoreOptions.num_windows, metavar="N", help=what)
-    _add_coarse(score.add_argument_group(_OWN, "score the difference between the telemetry and the enhanced run"))
-    score.add_argument("--figure", action="store_true", help="draw series, scores and events beside SCORES, as .png")
-    score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several simulators")
+    score.add_argument(
+        "--windows",
+        dest="num_windows",
+        type=int,
+        default=ScoreOptions.num_windows,
+        metavar="N",
+        help=what,
+    )
+    _add_coarse(
+        score.add_argument_group(
+            _OWN, "score the difference between the telemetry and the enhanced run"
+        )
+    )
+    score.add_argument(
+        "--figure",
+        action="store_true",
+        help="draw series, scores and events beside SCORES, as .png",
+    )
+    score.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="SCORES",
+        help="a .parquet or .csv file; a folder for several simulators",
+    )
     _add_json(score)
     _add_seed(score)
 
@@ -158,8 +239,17 @@ def _add_update(commands: argparse._SubParsersAction) -> None:
     update.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
     _add_source(update)
     _add_coarse(update.add_argument_group(_OWN, "for simulators that were fitted with --coarse"))
-    update.add_argument("--out", type=Path, metavar="NEW_DIR", help="folder for the updated simulators (default: MODEL_DIR-updated)")
-    update.add_argument("--replace", action="store_true", help="replace simulators that are in NEW_DIR, which may be MODEL_DIR")
+    update.add_argument(
+        "--out",
+        type=Path,
+        metavar="NEW_DIR",
+        help="folder for the updated simulators (default: MODEL_DIR-updated)",
+    )
+    update.add_argument(
+        "--replace",
+        action="store_true",
+        help="replace simulators that are in NEW_DIR, which may be MODEL_DIR",
+    )
     add_options(update, FitOptions, "held_out")
     _add_json(update)
     _add_seed(update)
@@ -175,15 +265,34 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
         "another_time, delay, lost_coupling, common_shift, of several channels in one table\n",
     )
     _add_source(inject)
-    inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at random places, or all; they are used in turn")
-    inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at random places (default: one of each kind)")
+    inject.add_argument(
+        "--kinds",
+        metavar="KIND,...",
+        help="kinds of anomaly at random places, or all; they are used in turn",
+    )
+    inject.add_argument(
+        "--number",
+        type=int,
+        metavar="N",
+        help="number of anomalies at random places (default: one of each kind)",
+    )
     severity = "severity in standard deviations of the noise, or a range (default: 4)"
     inject.add_argument("--severity", metavar="SD[:SD]", help=severity)
     noise = "standard deviation of the noise (default: estimated from second differences)"
     inject.add_argument("--noise-sd", type=float, metavar="SD", help=noise)
     _add_events(inject, "anomaly", "KIND", "ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h")
-    inject.add_argument("--figure", action="store_true", help="draw the changed channels, with the anomalies, beside OUT, as .png")
-    inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder: a file per channel")
+    inject.add_argument(
+        "--figure",
+        action="store_true",
+        help="draw the changed channels, with the anomalies, beside OUT, as .png",
+    )
+    inject.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="a .parquet or .csv file; a folder: a file per channel",
+    )
     _add_seed(inject)
 
 
@@ -192,12 +301,18 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
 _Parser = argparse.ArgumentParser | argparse._ArgumentGroup
 
 
-def _add_repeated(parser: _Parser, word: str, text: str, metavar: str = "NAME", default: list[str] | None = None) -> None:
-    parser.add_argument(word, action="append", default=default, metavar=metavar, help=f"{text}; may be repeated")
+def _add_repeated(
+    parser: _Parser, word: str, text: str, metavar: str = "NAME", default: list[str] | None = None
+) -> None:
+    parser.add_argument(
+        word, action="append", default=default, metavar=metavar, help=f"{text}; may be repeated"
+    )
 
 
 def _add_json(parser: _Parser) -> None:
-    parser.add_argument("--json", action="store_true", help="print one JSON object in place of lines of text")
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object in place of lines of text"
+    )
 
 
 def _add_seed(parser: _Parser) -> None:
@@ -211,10 +326,20 @@ def _add_workers(parser: _Parser, text: str, engine: str | None = "local") -> No
 
 
 def _add_events(parser: _Parser, noun: str, form: str, examples: str) -> None:
-    _add_repeated(parser, "--at", f"an {noun} at a given sample or time, such as {examples}", f"{form}[:SEVERITY]@BEGIN/LENGTH", [])
+    _add_repeated(
+        parser,
+        "--at",
+        f"an {noun} at a given sample or time, such as {examples}",
+        f"{form}[:SEVERITY]@BEGIN/LENGTH",
+        [],
+    )
     length = "length at random places: samples, a time such as 10min, or a range (default: 100)"
     parser.add_argument("--length", default="100", metavar="N[:N]", help=length)
-    parser.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channels, is_anomaly")
+    parser.add_argument(
+        "--timeeval",
+        action="store_true",
+        help="write TimeEval's CSV: timestamp, the channels, is_anomaly",
+    )
 
 
 def _add_source(parser: argparse.ArgumentParser) -> None:
@@ -222,18 +347,37 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     _add_repeated(parser, "--column", "only this column (default: all numeric columns)")
     time = "the time column (default: detected); give 'none' to use the sample number as the time"
     parser.add_argument("--time", metavar="NAME", help=time)
-    parser.add_argument("--interval", type=float, metavar="SECONDS", help="sampling interval (default: the most frequent one)")
-    table = parser.add_argument_group("tables in other forms", "what is detected unless it is given (docs/own_data.md)")
+    parser.add_argument(
+        "--interval",
+        type=float,
+        metavar="SECONDS",
+        help="sampling interval (default: the most frequent one)",
+    )
+    table = parser.add_argument_group(
+        "tables in other forms", "what is detected unless it is given (docs/own_data.md)"
+    )
     _add_repeated(table, "--label-column", "column that labels anomalous rows, or 'none'")
-    _add_repeated(table, "--series-column", "column whose values tell several series apart, or 'none'")
-    table.add_argument("--no-header", action="store_true", help="the file has no line of names: columns are 'column 0', 'column 1', ...")
-    table.add_argument("--decimal", choices=(".", ","), help="decimal sign; the other one separates thousands")
+    _add_repeated(
+        table, "--series-column", "column whose values tell several series apart, or 'none'"
+    )
+    table.add_argument(
+        "--no-header",
+        action="store_true",
+        help="the file has no line of names: columns are 'column 0', 'column 1', ...",
+    )
+    table.add_argument(
+        "--decimal", choices=(".", ","), help="decimal sign; the other one separates thousands"
+    )
     _add_cleaning(parser)
 
 
 def _add_coarse(parser: _Parser) -> None:
-    parser.add_argument("--coarse", metavar="SOURCE", help="recorded run of the simulator: " + SOURCES)
-    parser.add_argument("--coarse-time", metavar="NAME", help="the time column of that run (default: detected)")
+    parser.add_argument(
+        "--coarse", metavar="SOURCE", help="recorded run of the simulator: " + SOURCES
+    )
+    parser.add_argument(
+        "--coarse-time", metavar="NAME", help="the time column of that run (default: detected)"
+    )
     start = "time in UTC of the zero of that run, such as 2024-03-01T00:00:00, if its times count from zero"
     parser.add_argument("--coarse-start", metavar="TIME", help=start)
 
@@ -245,11 +389,17 @@ def _add_cleaning(parser: _Parser) -> None:
     )
     parser.add_argument("--time-format", metavar="FORMAT", help=form)
     missing = "values that mean 'no value', such as --missing-values=-999.9"
-    parser.add_argument("--missing-values", action="append", default=[], metavar="VALUE,...", help=missing)
+    parser.add_argument(
+        "--missing-values", action="append", default=[], metavar="VALUE,...", help=missing
+    )
     zone = "time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
     parser.add_argument("--timezone", metavar="ZONE", help=zone)
     most = "longest gap, in samples, that is filled (default: 5; any with --fill hold)"
     parser.add_argument("--max-fill", type=int, metavar="N", help=most)
     fill = "fill gaps by straight lines (default), or hold the last value, for telemetry that is sent only when it changes"
     parser.add_argument("--fill", choices=("linear", "hold"), default="linear", help=fill)
-    parser.add_argument("--drop-bad", action="store_true", help="drop and count values and times that cannot be read, instead of stopping")
+    parser.add_argument(
+        "--drop-bad",
+        action="store_true",
+        help="drop and count values and times that cannot be read, instead of stopping",
+    )

@@ -10,7 +10,9 @@ from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.registry import existing
 
 _OF_RUNS = "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values"
-_NOT_OF_RUNS = "windows continuous start scenario at number timeeval nominal_share workers engine".split()
+_NOT_OF_RUNS = (
+    "windows continuous start scenario at number timeeval nominal_share workers engine".split()
+)
 _MOST_EVENTS = 10_000
 
 
@@ -21,8 +23,16 @@ def check(options: argparse.Namespace) -> argparse.Namespace:
         InputError: If a value is out of range, options contradict each other, or there is no such source or simulator.
     """
     if not 0 <= options.seed < 2**31:
-        raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
-    checks = {"fit": _check_fit, "generate": _check_generate, "score": _check_score, "update": _check_update, "inject": _check_inject}
+        raise InputError(
+            f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}."
+        )
+    checks = {
+        "fit": _check_fit,
+        "generate": _check_generate,
+        "score": _check_score,
+        "update": _check_update,
+        "inject": _check_inject,
+    }
     if options.command in checks:
         checks[options.command](options)
     for source in (getattr(options, "source", None), getattr(options, "coarse", None)):
@@ -38,14 +48,18 @@ def check(options: argparse.Namespace) -> argparse.Namespace:
 def _check_fit(options: argparse.Namespace) -> None:
     options.chosen = options_from(options, FitOptions)
     if options.coarse is None:
-        _refuse(options, "without --coarse", "coarse_time", "coarse_start", "coarse_column", "delay_s")
+        _refuse(
+            options, "without --coarse", "coarse_time", "coarse_start", "coarse_column", "delay_s"
+        )
     options.workers = parse_workers(options.workers, options.engine)
     options.cleaning = cleaning_options(options, options.window or 32, "missing")
 
 
 def _check_score(options: argparse.Namespace) -> None:
     named = {option_name(name): name for name in (RESIDUAL, *DETECTORS)}
-    options.chosen = ScoreOptions(named.get(options.detector), options.num_windows, options.false_alarm_rate, options.seed)
+    options.chosen = ScoreOptions(
+        named.get(options.detector), options.num_windows, options.false_alarm_rate, options.seed
+    )
     options.cleaning = cleaning_options(options, 2)
 
 
@@ -57,36 +71,63 @@ def _check_update(options: argparse.Namespace) -> None:
 def _check_inject(options: argparse.Namespace) -> None:
     from enhsim_tf.datasets.places import INJECTIONS, WITHOUT_SEVERITY, InjectOptions, split_limits
 
-    kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
+    kinds = (
+        tuple(INJECTIONS)
+        if options.kinds == "all"
+        else tuple(filter(None, (options.kinds or "").split(",")))
+    )
     least, greatest = split_limits("severity", options.severity or "4")
     try:
         severity = float(least), float(greatest)
     except ValueError:
-        raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
+        raise InputError(
+            f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}."
+        ) from None
     length = split_limits("length", options.length)
-    options.chosen = InjectOptions(kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed)
+    options.chosen = InjectOptions(
+        kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed
+    )
     if set(kinds) <= set(WITHOUT_SEVERITY) and not options.at:
-        _refuse(options, f"with {options.kinds}: of the kinds of several channels, common_shift alone has one", "severity")
+        _refuse(
+            options,
+            f"with {options.kinds}: of the kinds of several channels, common_shift alone has one",
+            "severity",
+        )
     options.cleaning = cleaning_options(options, 3)
 
 
 def _check_generate(options: argparse.Namespace) -> None:
-    options.cleaning, options.is_large = cleaning_options(options, 2), bool(options.workers or options.engine)
+    options.cleaning, options.is_large = (
+        cleaning_options(options, 2),
+        bool(options.workers or options.engine),
+    )
     if options.coarse is not None:
-        _refuse(options, "with --coarse, because the run gives length, times and labels", *_NOT_OF_RUNS)
+        _refuse(
+            options, "with --coarse, because the run gives length, times and labels", *_NOT_OF_RUNS
+        )
         return
     _refuse(options, "without --coarse", *_OF_RUNS)
     if options.continuous is None:
         _refuse(options, "without --continuous", "start", "at", "number", "timeeval")
         if options.windows is None:
-            raise InputError("Expected --windows or --continuous. Received: neither. Give one of them.")
+            raise InputError(
+                "Expected --windows or --continuous. Received: neither. Give one of them."
+            )
     else:
-        _refuse(options, "with --continuous, which makes one series", "nominal_share", "workers", "engine")
+        _refuse(
+            options,
+            "with --continuous, which makes one series",
+            "nominal_share",
+            "workers",
+            "engine",
+        )
     if not options.scenario:
         _refuse(options, "without --scenario", "nominal_share")
     options.nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
     if not 0 <= options.nominal_share <= 1:
-        raise InputError(f"Expected a nominal share from 0 to 1. Received: {options.nominal_share}.")
+        raise InputError(
+            f"Expected a nominal share from 0 to 1. Received: {options.nominal_share}."
+        )
     options.workers = parse_workers(options.workers, options.engine)
     from enhsim_tf.datasets.places import parse_scenario  # imports NumPy, so it comes last
 
@@ -103,8 +144,12 @@ def _check_series(options: argparse.Namespace) -> None:
         raise InputError(
             "Expected --number, of events at drawn places, with several --scenario in a series, or with --scenario and --at. Received: none."
         )
-    if options.number is not None and not (1 <= options.number <= _MOST_EVENTS and options.scenario):
-        raise InputError(f"Expected --number from 1 to {_MOST_EVENTS:,}, with --scenario. Received: --number {options.number}.")
+    if options.number is not None and not (
+        1 <= options.number <= _MOST_EVENTS and options.scenario
+    ):
+        raise InputError(
+            f"Expected --number from 1 to {_MOST_EVENTS:,}, with --scenario. Received: --number {options.number}."
+        )
     for scenario in options.scenario if options.number is not None else ():
         if scenario.channel is not None or scenario.onset[0] < scenario.onset[1]:
             raise InputError(
@@ -123,16 +168,22 @@ def _refuse(options: argparse.Namespace, when: str, *names: str) -> None:
     """Refuses options that are given."""
     for name in names:
         if getattr(options, name) not in (None, [], False):
-            raise InputError(f"Expected no {option_of(name)} {when}. Received: {option_of(name)}. Leave it out.")
+            raise InputError(
+                f"Expected no {option_of(name)} {when}. Received: {option_of(name)}. Leave it out."
+            )
 
 
-def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> Cleaning:
+def cleaning_options(
+    options: argparse.Namespace, min_part: int, labelled: str = "keep"
+) -> Cleaning:
     """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
     same = "label_column series_column no_header decimal time_format timezone max_fill fill drop_bad".split()
     return Cleaning(
         **{name: getattr(options, name) for name in same if hasattr(options, name)},
         interval_s=getattr(options, "interval", None),
         labelled=labelled,
-        missing_values=tuple(value for values in options.missing_values for value in values.split(",")),
+        missing_values=tuple(
+            value for values in options.missing_values for value in values.split(",")
+        ),
         min_part=min_part,
     )

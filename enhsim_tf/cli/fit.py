@@ -53,10 +53,17 @@ def run_fit(options: argparse.Namespace) -> int:
     say("reading ...")
     read_run = None
     if options.coarse is not None:
-        given = options.coarse, options.coarse_column, options.coarse_time, options.cleaning.of_run(min_part=2)
+        given = (
+            options.coarse,
+            options.coarse_column,
+            options.coarse_time,
+            options.cleaning.of_run(min_part=2),
+        )
         read_run = functools.partial(read_recording, *given, start=options.coarse_start)
     series = read_source(options.source, options.column, options.time, options.cleaning)
-    reports, failed = fit_channels(series, options, say, read_run, None if read_run is not None else series.commands)
+    reports, failed = fit_channels(
+        series, options, say, read_run, None if read_run is not None else series.commands
+    )
     if options.json:
         tell(json.dumps(reports))
     return tell_failed(failed)
@@ -81,18 +88,28 @@ def fit_channels(
     """
     out = Path(os.path.abspath(options.out))
     if (out / MANIFEST).is_file():
-        raise InputError(f"Expected a folder for models. Received: {options.out}, which is a model itself. Give another --out.")
-    groups = [{name: each} for name, each in series.items()] if options.separately else [dict(series)]
+        raise InputError(
+            f"Expected a folder for models. Received: {options.out}, which is a model itself. Give another --out."
+        )
+    groups = (
+        [{name: each} for name, each in series.items()] if options.separately else [dict(series)]
+    )
     for name in (*map(_name, groups), *series):
         refuse_foreign(folder_of(out, name))
     new_folders = [each for each in (out, *out.parents) if not each.exists()]
     reports: dict[str, dict] = {}
     failed: dict[str, str] = {}
-    work = functools.partial(fit_or_say, out=out, options=options, read_run=read_run, commands=commands)
+    work = functools.partial(
+        fit_or_say, out=out, options=options, read_run=read_run, commands=commands
+    )
     in_this_process = options.workers == 0 or (len(groups) == 1 and options.engine == "local")
     try:
         make_folder(out)
-        for outcome in map(work, groups) if in_this_process else _fitted_by_processes(work, groups, options.engine, options.workers):
+        for outcome in (
+            map(work, groups)
+            if in_this_process
+            else _fitted_by_processes(work, groups, options.engine, options.workers)
+        ):
             reports, failed = reports | outcome.reports, failed | outcome.failed
             for line in outcome.lines:
                 say(line)
@@ -108,12 +125,16 @@ def _name(group: Group) -> str:
     return name_of_channels(list(group))
 
 
-def _fitted_by_processes(work: Callable[[Group], Outcome], groups: Sequence[Group], engine: str, workers: int | None) -> Iterator[Outcome]:
+def _fitted_by_processes(
+    work: Callable[[Group], Outcome], groups: Sequence[Group], engine: str, workers: int | None
+) -> Iterator[Outcome]:
     """Fits the channels with an engine. If its workers keep dying, the channels that they had taken fail, and the others are fitted."""
     waiting = {_name(group): group for group in groups}
     while waiting:
         try:
-            with contextlib.closing(engines.run(engine, work, list(waiting.values()), workers)) as running:
+            with contextlib.closing(
+                engines.run(engine, work, list(waiting.values()), workers)
+            ) as running:
                 for outcome in running:
                     del waiting[outcome.name]
                     yield outcome
@@ -145,21 +166,31 @@ def fit_or_say(
     groups = join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []
     if len(groups) > 1:
         others = "; ".join(spoken(each.columns) for each in groups)
-        outcome.lines.append(f"channels of other sampling intervals or times get a simulator of their own: {others}")
+        outcome.lines.append(
+            f"channels of other sampling intervals or times get a simulator of their own: {others}"
+        )
     speaks = options.engine == "local" and not options.json
     for telemetry in groups:
         progress = Progress(tell, f"{spoken(telemetry.columns)}: ") if speaks else SILENT
         interval_s = telemetry.interval_s if telemetry.start is not None else None
         try:
             run = None if read_run is None else read_run(interval_s=interval_s)
-            fitted = fit(telemetry, run, options.chosen, progress, commands if len(group) == 1 else None)
+            fitted = fit(
+                telemetry, run, options.chosen, progress, commands if len(group) == 1 else None
+            )
             _save(*fitted, cleaned, out, outcome)
         except InputError as error:
             outcome.failed |= dict.fromkeys(telemetry.columns, str(error))
     return outcome
 
 
-def _save(simulator: EnhancedSimulator, report: Report, cleaned: Mapping[str, Cleaned], out: Path, outcome: Outcome) -> None:
+def _save(
+    simulator: EnhancedSimulator,
+    report: Report,
+    cleaned: Mapping[str, Cleaned],
+    out: Path,
+    outcome: Outcome,
+) -> None:
     """Saves a fitted simulator with its report. Nothing is written if a step fails."""
     from enhsim_tf.simulator.figures import report_figure
 
@@ -167,7 +198,10 @@ def _save(simulator: EnhancedSimulator, report: Report, cleaned: Mapping[str, Cl
     folder = folder_of(out, name)
     refuse_foreign(folder)  # checked again, because the fit took time
     instead = ", in place of the one that was there" if (folder / MANIFEST).is_file() else ""
-    found = {"report": report.to_dict(), "cleaning": {channel: cleaned[channel].report.to_dict() for channel in simulator.channels}}
+    found = {
+        "report": report.to_dict(),
+        "cleaning": {channel: cleaned[channel].report.to_dict() for channel in simulator.channels},
+    }
     with replace_folder(folder) as temporary:
         simulator.save(temporary)
         write_json(temporary / "report.json", found)

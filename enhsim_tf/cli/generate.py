@@ -23,11 +23,19 @@ from enhsim_tf.telemetry.placing import PlacedEvent
 
 def run_generate(options: argparse.Namespace) -> int:
     """Generates labelled training data with the simulator of each channel and returns the exit code."""
-    is_series, models = options.continuous is not None, chosen_of(models_of(options.models), options.channel)
+    is_series, models = (
+        options.continuous is not None,
+        chosen_of(models_of(options.models), options.channel),
+    )
     if options.is_large:
-        paths = {name: options.out if len(models) == 1 else folder_of(options.out, name) for name in models}
+        paths = {
+            name: options.out if len(models) == 1 else folder_of(options.out, name)
+            for name in models
+        }
     else:
-        suffixes = (".csv",) if options.timeeval else (".parquet", ".csv") if is_series else (".parquet",)
+        suffixes = (
+            (".csv",) if options.timeeval else (".parquet", ".csv") if is_series else (".parquet",)
+        )
         paths = output_paths(options.out, models, suffixes)
     refuse_same_file(paths.values(), options.coarse or ())
 
@@ -38,30 +46,57 @@ def run_generate(options: argparse.Namespace) -> int:
         elif is_series:
             what = _write_series(options, simulator, paths[name])
         else:
-            plan = make_plan(simulator, models[name], options.scenario, options.nominal_share, options.windows, options.seed)
+            plan = make_plan(
+                simulator,
+                models[name],
+                options.scenario,
+                options.nominal_share,
+                options.windows,
+                options.seed,
+            )
             what = f"{counted(plan.num_windows, 'window')} of {plan.window} samples"
             if options.is_large:
                 what += f" in {counted(plan.num_shards, 'shard')}"
-                generate_data_set(paths[name], plan, options.workers, options.engine or "local", tell)
+                generate_data_set(
+                    paths[name], plan, options.workers, options.engine or "local", tell
+                )
             else:
                 write_windows(paths[name], plan, simulator)
         tell(f"{printable(name)}: {what} in {paths[name]}")
-        trusted, rng = TrustedRange(simulator) if options.scenario else None, np.random.default_rng(options.seed)
+        trusted, rng = (
+            TrustedRange(simulator) if options.scenario else None,
+            np.random.default_rng(options.seed),
+        )
         for scenario in options.scenario:
             share = trusted.share_outside(*(scenario.draw(rng) for _ in range(200)))
-            tell(f"{printable(name)}: {scenario}: {share:.0%} of such windows are outside its enhancer's training range")
+            tell(
+                f"{printable(name)}: {scenario}: {share:.0%} of such windows are outside its enhancer's training range"
+            )
 
     return for_each(models, generate)
 
 
 def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, path: Path) -> str:
     """Writes a labelled series and returns what is said of it."""
-    interval_s, rng, scenario, schedule = simulator.interval_s, np.random.default_rng([options.seed, 3]), None, []
+    interval_s, rng, scenario, schedule = (
+        simulator.interval_s,
+        np.random.default_rng([options.seed, 3]),
+        None,
+        [],
+    )
     length = parse_num_samples(options.continuous, interval_s)
     if options.at or options.number:
-        index, lengths = series_index(length, interval_s, options.start), length_limits(options.length, interval_s)
-        given = [PlacedEvent(place.kind, place.severity, *place.samples(index, interval_s)) for place in options.at]
-        schedule = draw_schedule(simulator, length, given, options.scenario, options.number or 0, lengths, rng)
+        index, lengths = (
+            series_index(length, interval_s, options.start),
+            length_limits(options.length, interval_s),
+        )
+        given = [
+            PlacedEvent(place.kind, place.severity, *place.samples(index, interval_s))
+            for place in options.at
+        ]
+        schedule = draw_schedule(
+            simulator, length, given, options.scenario, options.number or 0, lengths, rng
+        )
     elif options.scenario:
         scenario = options.scenario[0].draw(rng)
     frame = series_labelled(simulator, length, scenario, options.seed, options.start, schedule)
@@ -72,10 +107,19 @@ def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, pat
     return what
 
 
-def _write_copies(options: argparse.Namespace, name: str, model: EnhancedSimulator, path: Path) -> str:
+def _write_copies(
+    options: argparse.Namespace, name: str, model: EnhancedSimulator, path: Path
+) -> str:
     """Writes copies of a recorded run of the user's own simulator and returns what is said of them."""
     copies, runs = 1 if options.copies is None else options.copies, model.recorded_runs()
-    run = read_recording(options.coarse, runs.columns, options.coarse_time, options.cleaning, model.interval_s, options.coarse_start)
+    run = read_recording(
+        options.coarse,
+        runs.columns,
+        options.coarse_time,
+        options.cleaning,
+        model.interval_s,
+        options.coarse_start,
+    )
     num_rows = write_copies(path, model, run, copies, options.seed)
     lines = [*run.notes, *coverage_lines(model, run)]
     if runs.delay_s:

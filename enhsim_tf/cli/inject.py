@@ -17,7 +17,9 @@ def run_inject(options: argparse.Namespace) -> int:
     chosen, cleaning = options.chosen, options.cleaning
     series = read_source(options.source, options.column, options.time, cleaning)
     suffixes = (".csv",) if options.timeeval else (".parquet", ".csv")
-    is_one_table = chosen.is_joint or (options.out.suffix in suffixes and not os.path.isdir(options.out))
+    is_one_table = chosen.is_joint or (
+        options.out.suffix in suffixes and not os.path.isdir(options.out)
+    )
     files = {"all channels": list(series)} if is_one_table else {name: [name] for name in series}
     paths = output_paths(options.out, files, suffixes)
     refuse_same_file(paths.values(), options.source)
@@ -32,9 +34,19 @@ def run_inject(options: argparse.Namespace) -> int:
 
             inject_figure(frame, channels).savefig(path.with_suffix(".png"), dpi=200, format="png")
         lines = lines_of([each.report for each in cleaned.values()])
-        number, changed = counted(len(frame.attrs["anomalies"]), "anomaly"), counted(int(frame["mask"].sum()), "sample")
+        number, changed = (
+            counted(len(frame.attrs["anomalies"]), "anomaly"),
+            counted(int(frame["mask"].sum()), "sample"),
+        )
         said = "given" if chosen.noise_sd is not None else "estimated from second differences"
         noise = "" if len(channels) > 1 else f"; noise sd {frame.attrs['noise_sd']:.4g} ({said})"
-        tell("\n".join([*lines, f"{spoken(channels)}: {number}, {changed} of {len(frame):,} changed{noise}; in {path}"]))
+        tell(
+            "\n".join(
+                [
+                    *lines,
+                    f"{spoken(channels)}: {number}, {changed} of {len(frame):,} changed{noise}; in {path}",
+                ]
+            )
+        )
 
     return for_each(files, write)

@@ -59,7 +59,9 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
         make_folder(out.parent)
         return {names[0]: out}
     if out.suffix and not is_folder:
-        raise InputError(f"Expected a file that ends in {' or '.join(suffixes)}, or a folder. Received: --out {out}.")
+        raise InputError(
+            f"Expected a file that ends in {' or '.join(suffixes)}, or a folder. Received: --out {out}."
+        )
     paths = {name: folder_of(out, name).with_suffix(suffixes[0]) for name in names}
     make_folder(out)
     return paths
@@ -70,10 +72,14 @@ def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str]) -> None
     for path in paths:
         for each in [source] if isinstance(source, str) else source:
             if path.exists() and os.path.exists(each) and path.samefile(each):
-                raise InputError(f"Expected --out to differ from the input. Received: {path} for both. Give another --out.")
+                raise InputError(
+                    f"Expected --out to differ from the input. Received: {path} for both. Give another --out."
+                )
 
 
-def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict[str, dict[str, str]]:
+def channels_by_model(
+    series: Iterable[str], models: Mapping[str, Path]
+) -> dict[str, dict[str, str]]:
     """Returns, for each model whose channels a source has, the name in the source of each of its channels; says which columns are left.
 
     A single channel and a single model of one channel match even if their names differ.
@@ -83,18 +89,26 @@ def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict
     if len(series) == len(wanted) == 1 and len(next(iter(wanted.values()))) == 1:
         ((name, (channel,)),) = wanted.items()
         return {name: {channel: series[0]}}
-    found = {name: {channel: channel for channel in channels} for name, channels in wanted.items() if set(channels) <= set(series)}
+    found = {
+        name: {channel: channel for channel in channels}
+        for name, channels in wanted.items()
+        if set(channels) <= set(series)
+    }
     used = {channel for channels in found.values() for channel in channels}
     if not found:
         known = printable("; ".join(", ".join(channels) for channels in list(wanted.values())[:8]))
-        raise InputError(f"Expected fitted channels: {known}. Received: {', '.join(series[:8])}. Give telemetry with these columns.")
+        raise InputError(
+            f"Expected fitted channels: {known}. Received: {', '.join(series[:8])}. Give telemetry with these columns."
+        )
     others = [name for name in series if name not in used]
     if others:
         tell(f"columns without a fitted simulator, left out: {printable(', '.join(others[:8]))}")
     return found
 
 
-def cleaned_channels(series: Mapping[str, pd.Series], names: Mapping[str, str], cleaning: Cleaning) -> tuple[Recording, dict[str, Cleaned]]:
+def cleaned_channels(
+    series: Mapping[str, pd.Series], names: Mapping[str, str], cleaning: Cleaning
+) -> tuple[Recording, dict[str, Cleaned]]:
     """Cleans channels, whose names in the source are given, brings them onto one clock, and returns what was cleaned."""
     cleaned = {channel: clean(series[name], cleaning) for channel, name in names.items()}
     joined = join_channels({channel: each.parts for channel, each in cleaned.items()})
@@ -106,7 +120,9 @@ def cleaned_channels(series: Mapping[str, pd.Series], names: Mapping[str, str], 
     return joined[0], cleaned
 
 
-def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Namespace, cleaning: Cleaning) -> Recording | None:
+def run_for(
+    simulator: EnhancedSimulator, series: Channels, options: argparse.Namespace, cleaning: Cleaning
+) -> Recording | None:
     """Returns the coarse run that a simulator needs: the commands beside the telemetry, or the run of `--coarse`; None for waves."""
     if not simulator.is_run_model:
         if options.coarse is not None:
@@ -126,8 +142,17 @@ def run_for(simulator: EnhancedSimulator, series: Channels, options: argparse.Na
         )
     columns = simulator.alignment.columns
     try:
-        return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)
+        return read_recording(
+            options.coarse,
+            columns,
+            options.coarse_time,
+            cleaning.of_run(),
+            simulator.interval_s,
+            options.coarse_start,
+        )
     except InputError as error:
         if series.table is None or not set(columns) <= set(series.table):
             raise
-        raise InputError(f"{error} Perhaps {options.source}, which has the columns of the run, is the run. Swap the two.") from None
+        raise InputError(
+            f"{error} Perhaps {options.source}, which has the columns of the run, is the run. Swap the two."
+        ) from None

@@ -28,8 +28,17 @@ def run_score(options: argparse.Namespace) -> int:
     models, cleaning = models_of(options.models), options.cleaning
     series = read_source(options.source, options.column, options.time, cleaning)
     channels = channels_by_model(series, models)
-    source_names = {model: next(iter(names.values())) if len(names) == 1 else model for model, names in channels.items()}
-    paths = dict(zip(channels, output_paths(options.out, source_names.values(), (".parquet", ".csv")).values(), strict=True))
+    source_names = {
+        model: next(iter(names.values())) if len(names) == 1 else model
+        for model, names in channels.items()
+    }
+    paths = dict(
+        zip(
+            channels,
+            output_paths(options.out, source_names.values(), (".parquet", ".csv")).values(),
+            strict=True,
+        )
+    )
     refuse_same_file([*paths.values(), *map(events_path, paths.values())], options.source)
     found = {}
 
@@ -42,7 +51,9 @@ def run_score(options: argparse.Namespace) -> int:
         if options.figure:
             from enhsim_tf.simulator.figures import score_figure  # matplotlib is slow to import
 
-            score_figure(frame, simulator, spoken(simulator.channels)).savefig(paths[model].with_suffix(".png"), dpi=200, format="png")
+            score_figure(frame, simulator, spoken(simulator.channels)).savefig(
+                paths[model].with_suffix(".png"), dpi=200, format="png"
+            )
         found[source_names[model]] = {
             "scores": str(paths[model]),
             "detector": frame.attrs["detector"],
@@ -53,11 +64,16 @@ def run_score(options: argparse.Namespace) -> int:
             "events": json.loads(events_table(frame).to_json(orient="records", date_format="iso")),
         }
         if not options.json:
-            notes = [f"{printable(model)}: {note}" for note in (run.notes if run is not None else ())]
+            notes = [
+                f"{printable(model)}: {note}" for note in (run.notes if run is not None else ())
+            ]
             lines = lines_of([each.report for each in cleaned.values()])
             if not found[source_names[model]]["keeps_promise"]:
                 flagged = f"{simulator.trained['false_alarms']:.0%} were flagged at 1 % set"
-                lines.insert(0, f"{spoken(simulator.channels)}: WARNING: on held-out nominal time {flagged}, so do not trust these alarms")
+                lines.insert(
+                    0,
+                    f"{spoken(simulator.channels)}: WARNING: on held-out nominal time {flagged}, so do not trust these alarms",
+                )
             tell("\n".join([*lines, *notes, *_said(frame, simulator, paths[model])]))
 
     code = for_each(channels, write)
@@ -83,7 +99,11 @@ def _said(frame: pd.DataFrame, simulator: EnhancedSimulator, path: Path) -> list
         line += f"; {outside / max(scored, 1):.1%} outside the training range" if outside else ""
     (expected, low, high), found = frame.attrs["false_alarms_per_day"], frame.attrs["events"]
     later = counted(sum(event["against"] == NEW for event in found), "event")
-    kinds = f" (1 lasting departure; {later} against the new operating point)" if frame.attrs["departure"] else ""
+    kinds = (
+        f" (1 lasting departure; {later} against the new operating point)"
+        if frame.attrs["departure"]
+        else ""
+    )
     unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
     events = (
         f"{counted(len(found), 'event')} in {events_path(path)}{kinds}; on generated nominal telemetry {expected:.3g} false alarms per {unit} "

@@ -37,14 +37,25 @@ def run_update(options: argparse.Namespace) -> int:
         simulator = EnhancedSimulator.load(models[model])
         run = run_for(simulator, series, options, cleaning)
         updated, report = update(simulator, telemetry, run, options.held_out, options.seed)
-        kept = {"update": report.to_dict(), "cleaning": {name: each.report.to_dict() for name, each in cleaned.items()}}
+        kept = {
+            "update": report.to_dict(),
+            "cleaning": {name: each.report.to_dict() for name, each in cleaned.items()},
+        }
         with replace_folder(folders[model]) as temporary:
             updated.save(temporary)
             write_json(temporary / "report.json", kept)
         found[model] = kept
         if not options.json:
             lines = lines_of([each.report for each in cleaned.values()])
-            tell("\n".join([*lines, *report.lines(), f"updated simulator and report.json in {folders[model]}/"]))
+            tell(
+                "\n".join(
+                    [
+                        *lines,
+                        *report.lines(),
+                        f"updated simulator and report.json in {folders[model]}/",
+                    ]
+                )
+            )
 
     code = for_each(channels, write)
     if options.json:

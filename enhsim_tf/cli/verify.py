@@ -15,5 +15,7 @@ def run_verify(options: argparse.Namespace) -> int:
         code = 2
     if not code:
         settings = read_manifest(options.folder)["settings"]
-        tell(f"{counted(settings['windows'], 'window')} in {counted(num_shards(settings), 'shard')}, all intact")
+        tell(
+            f"{counted(settings['windows'], 'window')} in {counted(num_shards(settings), 'shard')}, all intact"
+        )
     return code

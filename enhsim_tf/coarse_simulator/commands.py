@@ -24,10 +24,15 @@ class CommandTraces:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the coarse columns."""
-        return tuple(f"command {number}" + (f", decay {decay:g}" if decay else "") for number, decay in self.chosen)
+        return tuple(
+            f"command {number}" + (f", decay {decay:g}" if decay else "")
+            for number, decay in self.chosen
+        )
 
     @classmethod
-    def fit(cls, values: np.ndarray, commands: np.ndarray, rows: np.ndarray | None = None) -> "CommandTraces | None":
+    def fit(
+        cls, values: np.ndarray, commands: np.ndarray, rows: np.ndarray | None = None
+    ) -> "CommandTraces | None":
         """Chooses at most `MOST_COMMANDS` commands of shape `(samples, commands)`, and the decay of each, that are most correlated with telemetry.
 
         The choice is made from these rows, None for all; the result is None if no command was sent.
@@ -48,8 +53,12 @@ class CommandTraces:
         """Computes the coarse columns, float32 of shape `(samples, traces)`; raises InputError for fewer commands than in the fit."""
         most = max(number for number, _ in self.chosen)
         if np.ndim(commands) != 2 or np.shape(commands)[1] < most:
-            raise InputError(f"Expected at least {most} columns of commands, as in the fit. Received: shape {np.shape(commands)}.")
-        return np.stack([_trace(commands[:, number - 1], decay) for number, decay in self.chosen], axis=1).astype(np.float32)
+            raise InputError(
+                f"Expected at least {most} columns of commands, as in the fit. Received: shape {np.shape(commands)}."
+            )
+        return np.stack(
+            [_trace(commands[:, number - 1], decay) for number, decay in self.chosen], axis=1
+        ).astype(np.float32)
 
     def recording(self, commands: np.ndarray) -> Recording:
         """Returns the coarse run of telemetry without times, whose samples are counted from 0; see `traces`."""

@@ -27,7 +27,9 @@ class Degraded:
 
     def __post_init__(self):
         if self.mode not in MODES:
-            raise InputError(f"Expected a mode, one of: {', '.join(MODES)}. Received: mode={self.mode!r}.")
+            raise InputError(
+                f"Expected a mode, one of: {', '.join(MODES)}. Received: mode={self.mode!r}."
+            )
         if not (0 <= self.severity <= 1 and 0 <= self.onset < 1):
             raise InputError(f"Expected 0 <= severity <= 1 and 0 <= onset < 1. Received: {self}.")
 
@@ -37,7 +39,9 @@ class Degraded:
 
     def first_sample(self, num_samples: int) -> int:
         """Sample at which the degradation of a window or series of this length starts."""
-        return min(int(round(self.onset * num_samples, 6)), num_samples - 1)  # rounded first, since 0.29 * 100 is 28.999999999999996
+        return min(
+            int(round(self.onset * num_samples, 6)), num_samples - 1
+        )  # rounded first, since 0.29 * 100 is 28.999999999999996
 
 
 def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int] | None:

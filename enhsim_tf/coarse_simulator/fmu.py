@@ -46,19 +46,28 @@ class FmuSimulator:
         try:
             import fmpy
         except ImportError:
-            raise InputError("Expected FMPy for an FMU. Received: no such package. Install it: pip install 'enhsim_tf[fmi]'.") from None
+            raise InputError(
+                "Expected FMPy for an FMU. Received: no such package. Install it: pip install 'enhsim_tf[fmi]'."
+            ) from None
         try:
             description = fmpy.read_model_description(str(path))
         except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions, and those of zip and XML
             raise InputError(
                 f"Expected an FMU. Received: {self.name}, which cannot be read ({short_reason(error)[:160]}). Export it again."
             ) from None
-        self._variables = {variable.name: variable.causality for variable in description.modelVariables}
+        self._variables = {
+            variable.name: variable.causality for variable in description.modelVariables
+        }
         self._check_names(self.columns, "output", None)
         self._check_names(self.parameters, "parameter", "parameter")
         self._check_names(commands.columns if commands else (), "input", "input")
 
-    def run(self, time_s: np.ndarray, scenario: Mapping[str, float] | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
+    def run(
+        self,
+        time_s: np.ndarray,
+        scenario: Mapping[str, float] | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> np.ndarray:
         """Simulates one run, see `interface.CoarseSimulator.run`; a scenario gives other values of parameters by name."""
         import fmpy
 
@@ -86,15 +95,23 @@ class FmuSimulator:
             raise InputError(
                 f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {short_reason(error)[:160]}. Correct the model."
             ) from None
-        places = np.searchsorted(found["time"], time_s + 1e-6 * step_s, "right") - 1  # an FMU may report events in between
+        places = (
+            np.searchsorted(found["time"], time_s + 1e-6 * step_s, "right") - 1
+        )  # an FMU may report events in between
         if len(found) < 2 or np.abs(found["time"][places] - time_s).max() > 1e-3 * step_s:
             raise InputError(
                 f"Expected results of {self.name} at all {len(time_s)} times. Received: {len(found)}. Choose another interval."
             )
         return np.stack([found[name][places] for name in self.columns], axis=1).astype(np.float64)
 
-    def _check_names(self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None) -> None:
+    def _check_names(
+        self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None
+    ) -> None:
         for name in names:
             if name not in self._variables or causality not in (None, self._variables[name]):
-                known = [each for each, what in self._variables.items() if causality in (None, what)]
-                raise InputError(f"Expected the name of a variable ({kind}) of {self.name}: {', '.join(known)[:160]}. Received: {name!r}.")
+                known = [
+                    each for each, what in self._variables.items() if causality in (None, what)
+                ]
+                raise InputError(
+                    f"Expected the name of a variable ({kind}) of {self.name}: {', '.join(known)[:160]}. Received: {name!r}."
+                )

@@ -26,7 +26,9 @@ class CoarseSimulator(Protocol):
 
     columns: tuple[str, ...]
 
-    def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
+    def run(
+        self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None
+    ) -> np.ndarray:
         """Simulates one run, an array of shape `(samples, columns)`.
 
         Args:
@@ -52,13 +54,17 @@ class FunctionSimulator:
     >>> coarse = FunctionSimulator(heater, columns=["heater"])
     """
 
-    def __init__(self, function: Callable[..., Any], columns: Sequence[str], name: str | None = None):
+    def __init__(
+        self, function: Callable[..., Any], columns: Sequence[str], name: str | None = None
+    ):
         self.function, self.columns = function, check_columns(columns)
         self.name = name or getattr(function, "__name__", type(function).__name__)
         parameters = inspect.signature(function).parameters
         self._takes = {word for word in ("scenario", "rng") if word in parameters}
 
-    def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
+    def run(
+        self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None
+    ) -> np.ndarray:
         """Calls the function, see `CoarseSimulator.run`; raises InputError for a scenario if the function has no parameter for it."""
         if scenario is not None and "scenario" not in self._takes:
             raise InputError(
@@ -71,12 +77,23 @@ class FunctionSimulator:
 def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
     """Returns the names of a simulator's outputs as a tuple; raises InputError if there is none, one is no text, or one occurs twice."""
     names = (columns,) if isinstance(columns, str) else tuple(columns)
-    if not names or any(not isinstance(name, str) or not name for name in names) or len(set(names)) < len(names):
-        raise InputError(f"Expected names of columns, each different. Received: {names!r}. Name every output once.")
+    if (
+        not names
+        or any(not isinstance(name, str) or not name for name in names)
+        or len(set(names)) < len(names)
+    ):
+        raise InputError(
+            f"Expected names of columns, each different. Received: {names!r}. Name every output once."
+        )
     return names
 
 
-def simulate(simulator: CoarseSimulator, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
+def simulate(
+    simulator: CoarseSimulator,
+    time_s: np.ndarray,
+    scenario: Any = None,
+    rng: np.random.Generator | None = None,
+) -> np.ndarray:
     """Runs a simulator, see `CoarseSimulator.run`, and checks what it returns; float32 of shape `(samples, columns)`.
 
     Raises:

@@ -24,12 +24,16 @@ class Delay:
     """A constant delay between the coarse run and the telemetry."""
 
     seconds: float  # how much later the telemetry is; in samples if there are no times
-    column: str | None = None  # the coarse column that it was estimated from; None if it was not estimated
+    column: str | None = (
+        None  # the coarse column that it was estimated from; None if it was not estimated
+    )
     correlation: float = float("nan")  # of that column with the telemetry at this delay
     undelayed: float = float("nan")  # the same without a delay
 
 
-def pair_recordings(telemetry: Recording, run: Recording, delay_s: float = 0.0, least_samples: int = 2) -> tuple[Recording, Recording]:
+def pair_recordings(
+    telemetry: Recording, run: Recording, delay_s: float = 0.0, least_samples: int = 2
+) -> tuple[Recording, Recording]:
     """Cuts telemetry and a coarse run, which is so much earlier, to the same parts, which both cover, on the clock of the telemetry.
 
     Raises InputError if the two share no time, or no stretch of so many samples.
@@ -46,10 +50,16 @@ def pair_recordings(telemetry: Recording, run: Recording, delay_s: float = 0.0, 
                 values.append(Run(part.values[first:stop], begin_s))
                 coarse.append(Run(there[first:stop], begin_s))
     if not longest:
-        spans, advice = (_span(telemetry, 0.0), _span(run, shift_s)), "Record the same time, or give --delay."
+        spans, advice = (
+            (_span(telemetry, 0.0), _span(run, shift_s)),
+            "Record the same time, or give --delay.",
+        )
         if run.clock().counts and not clocks[0].counts:
             begin = iso_time(nanoseconds(clocks[0], 0, 1)[0]).removesuffix("+00:00")
-            spans, advice = ("dates", "times from zero"), f"Give the time of that zero: --coarse-start {begin} if both begin together."
+            spans, advice = (
+                ("dates", "times from zero"),
+                f"Give the time of that zero: --coarse-start {begin} if both begin together.",
+            )
         raise InputError(
             f"Expected a coarse run that overlaps the telemetry in time. Received: {spans[0]} in {telemetry.name}, {spans[1]} in {run.name}. {advice}"
         )
@@ -59,7 +69,9 @@ def pair_recordings(telemetry: Recording, run: Recording, delay_s: float = 0.0, 
             "Record a longer run, or choose a smaller window."
         )
     joined = dataclasses.replace(telemetry, parts=tuple(values))
-    return joined, dataclasses.replace(run, parts=tuple(coarse), interval_s=interval_s, start=telemetry.start)
+    return joined, dataclasses.replace(
+        run, parts=tuple(coarse), interval_s=interval_s, start=telemetry.start
+    )
 
 
 def _span(recording: Recording, shift_s: float) -> str:
@@ -76,7 +88,10 @@ def _seconds_between(telemetry: Telemetry, recording: Recording) -> float:
             f"Expected times in both the telemetry and the coarse run, or in neither. Received: {with_times.name} with times, "
             f"{without.name} without. Name the time columns, or `none` for both."
         )
-    zeros = [int(nanoseconds(dataclasses.replace(each, offset_s=0.0), 0, 1)[0]) for each in (telemetry, clock)]
+    zeros = [
+        int(nanoseconds(dataclasses.replace(each, offset_s=0.0), 0, 1)[0])
+        for each in (telemetry, clock)
+    ]
     return float(zeros[1] - zeros[0]) / 1e9
 
 
@@ -100,12 +115,18 @@ def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples
         return Delay(0.0)  # pairing says that they share no time
     longest = max(max_samples, len(telemetry) // 4)
     delays = np.arange(-longest, longest + 1)
-    found = np.stack([_correlation(telemetry, coarse[:, column], delays) for column in range(coarse.shape[1])])
+    found = np.stack(
+        [_correlation(telemetry, coarse[:, column], delays) for column in range(coarse.shape[1])]
+    )
     near = np.abs(delays) <= max_samples
     column = int(np.argmax(np.max(found[:, near] ** 2, axis=1)))
     signed = found[column]
-    is_positive = max(signed[near].max(), 0.0) ** 2 >= (1 - _EQUALLY_GOOD) * np.max(signed[near] ** 2)
-    squared = np.maximum(signed if is_positive else -signed, 0.0) ** 2  # half a period away, a sine is the same upside down
+    is_positive = max(signed[near].max(), 0.0) ** 2 >= (1 - _EQUALLY_GOOD) * np.max(
+        signed[near] ** 2
+    )
+    squared = (
+        np.maximum(signed if is_positive else -signed, 0.0) ** 2
+    )  # half a period away, a sine is the same upside down
     undelayed = float(found[column, longest])
     if squared[near].max() < _LEAST_CORRELATION**2:
         return Delay(0.0, None, undelayed, undelayed)
@@ -116,14 +137,21 @@ def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples
             f"{abs(far):,} samples {'earlier' if far > 0 else 'later'}. Give --delay {far * interval_s:g} if this is right, or correct the clocks."
         )
     best = _nearest_maximum(np.where(near, squared, -1.0), longest, max(3, max_samples // 20))
-    return Delay(float(delays[best] * interval_s), recording.columns[column], float(found[column, best]), undelayed)
+    return Delay(
+        float(delays[best] * interval_s),
+        recording.columns[column],
+        float(found[column, best]),
+        undelayed,
+    )
 
 
 def _nearest_maximum(squared: np.ndarray, centre: int, reach: int) -> int:
     """Returns the index, nearest to the centre, of a local maximum that is about as high as the highest value."""
     padded = np.pad(squared, reach, constant_values=-1.0)
     highest_near = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
-    good = np.flatnonzero((squared >= highest_near) & (squared >= (1 - _EQUALLY_GOOD) * squared.max()))
+    good = np.flatnonzero(
+        (squared >= highest_near) & (squared >= (1 - _EQUALLY_GOOD) * squared.max())
+    )
     return int(good[np.argmin(np.abs(good - centre))])
 
 
@@ -131,7 +159,10 @@ def _correlation(telemetry: np.ndarray, coarse: np.ndarray, delays: np.ndarray) 
     """Computes the correlation of the telemetry with the delayed coarse column, over the samples that both have at each delay."""
     size = 1 << int(np.ceil(np.log2(2 * len(telemetry))))
     have = [np.isfinite(each).astype(np.float64) for each in (coarse, telemetry)]
-    values = [np.where(mask > 0, each - np.nanmean(each), 0.0) for each, mask in zip((coarse, telemetry), have, strict=True)]
+    values = [
+        np.where(mask > 0, each - np.nanmean(each), 0.0)
+        for each, mask in zip((coarse, telemetry), have, strict=True)
+    ]
 
     def shifted(first: np.ndarray, second: np.ndarray) -> np.ndarray:
         product = np.conj(np.fft.rfft(first, size)) * np.fft.rfft(second, size)
@@ -141,7 +172,9 @@ def _correlation(telemetry: np.ndarray, coarse: np.ndarray, delays: np.ndarray) 
     number = np.maximum(shifted(x_there, y_there), 1e-9)
     sum_x, sum_y = shifted(x, y_there), shifted(x_there, y)
     covariance = shifted(x, y) - sum_x * sum_y / number
-    power = (shifted(x**2, y_there) - sum_x**2 / number) * (shifted(x_there, y**2) - sum_y**2 / number)
+    power = (shifted(x**2, y_there) - sum_x**2 / number) * (
+        shifted(x_there, y**2) - sum_y**2 / number
+    )
     enough = number >= _LEAST_SHARE * number.max()
     is_known = enough & (power > 1e-12 * max(float(power.max()), 1e-300))
     return np.where(is_known, covariance / np.sqrt(np.where(power > 0, power, 1.0)), 0.0)

@@ -54,8 +54,12 @@ class Recording:
 
     def __post_init__(self):
         check_columns(self.columns)
-        if not self.parts or any(part.values.shape[1:] != (len(self.columns),) for part in self.parts):
-            raise InputError(f"Expected runs of {len(self.columns)} columns. Received: {[part.values.shape for part in self.parts]}.")
+        if not self.parts or any(
+            part.values.shape[1:] != (len(self.columns),) for part in self.parts
+        ):
+            raise InputError(
+                f"Expected runs of {len(self.columns)} columns. Received: {[part.values.shape for part in self.parts]}."
+            )
 
     def __len__(self) -> int:
         return sum(map(len, self.parts))
@@ -65,7 +69,9 @@ class Recording:
         """The values of all parts, one after another, float32 of shape `(samples, columns)`."""
         return np.concatenate([part.values for part in self.parts])
 
-    def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
+    def run(
+        self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None
+    ) -> np.ndarray:
         """Returns what was recorded, as `at`; raises InputError if a scenario is given or a time is not covered."""
         if scenario is not None:
             raise InputError(
@@ -93,15 +99,21 @@ class Recording:
             inside = (position >= -_TOLERANCE) & (position <= len(part) - 1 + _TOLERANCE)
             position = position[inside]
             nearest = np.round(position)
-            position = np.where(np.abs(position - nearest) <= _TOLERANCE, nearest, position)  # samples are returned unchanged
+            position = np.where(
+                np.abs(position - nearest) <= _TOLERANCE, nearest, position
+            )  # samples are returned unchanged
             for column in range(len(self.columns)):
-                values[inside, column] = np.interp(position, np.arange(len(part)), part.values[:, column])
+                values[inside, column] = np.interp(
+                    position, np.arange(len(part)), part.values[:, column]
+                )
         return values
 
     def clock(self, part: Run | None = None) -> Telemetry:
         """Returns a series with the times of a part, or of the recording's start, whose values mean nothing."""
         length, offset_s = (1, 0.0) if part is None else (len(part), part.offset_s)
-        return Telemetry(np.zeros(length, np.float32), self.interval_s, offset_s, self.start, self.name)
+        return Telemetry(
+            np.zeros(length, np.float32), self.interval_s, offset_s, self.start, self.name
+        )
 
     def select(self, columns: Sequence[str]) -> "Recording":
         """Returns the recording with the named columns, in the given order; raises InputError if one is missing."""
@@ -112,7 +124,10 @@ class Recording:
                 "Record it, with the name that it had in the fit."
             )
         places = [self.columns.index(name) for name in columns]
-        parts = tuple(dataclasses.replace(part, values=np.ascontiguousarray(part.values[:, places])) for part in self.parts)
+        parts = tuple(
+            dataclasses.replace(part, values=np.ascontiguousarray(part.values[:, places]))
+            for part in self.parts
+        )
         return dataclasses.replace(self, parts=parts, columns=tuple(columns))
 
 
@@ -140,9 +155,21 @@ def record(
     """
     time_s = np.asarray(time_s, np.float64)
     steps = np.diff(time_s)
-    if time_s.ndim != 1 or len(time_s) < 2 or not (steps > 0).all() or np.ptp(steps) > 1e-3 * steps.mean():
-        raise InputError(f"Expected at least two ascending times at a regular interval. Received: {len(time_s)} times. Give regular times.")
+    if (
+        time_s.ndim != 1
+        or len(time_s) < 2
+        or not (steps > 0).all()
+        or np.ptp(steps) > 1e-3 * steps.mean()
+    ):
+        raise InputError(
+            f"Expected at least two ascending times at a regular interval. Received: {len(time_s)} times. Give regular times."
+        )
     values = simulate(simulator, time_s, scenario, rng)
-    carried = {name: np.broadcast_to(np.asarray(value), len(time_s)) for name, value in (labels or {}).items()}
+    carried = {
+        name: np.broadcast_to(np.asarray(value), len(time_s))
+        for name, value in (labels or {}).items()
+    }
     run = Run(values, float(time_s[0]), carried)
-    return Recording((run,), tuple(simulator.columns), float(steps.mean()), start, name_of(simulator))
+    return Recording(
+        (run,), tuple(simulator.columns), float(steps.mean()), start, name_of(simulator)
+    )

@@ -23,8 +23,17 @@ from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 from enhsim_tf.telemetry.sources import Source, read_source
 from enhsim_tf.telemetry.windows import runs_of
 
-_NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns", "columns left out")  # kinds of such columns
-_FEW_ODD = 0.002  # share of steps that are no whole number of intervals, above which a run is interpolated
+_NO_INPUTS = (
+    "labels",
+    "quality flags",
+    "row numbers",
+    "further clocks",
+    "own columns",
+    "columns left out",
+)  # kinds of such columns
+_FEW_ODD = (
+    0.002  # share of steps that are no whole number of intervals, above which a run is interpolated
+)
 
 
 def read_recording(
@@ -54,14 +63,20 @@ def read_recording(
     """
     cleaning, name = dataclasses.replace(cleaning or Cleaning(), same_time="last"), "the coarse run"
     if not isinstance(source, pd.DataFrame | pd.Series):
-        name = printable(Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name)
+        name = printable(
+            Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name
+        )
     given = read_source(source, columns, time, cleaning)
     raw, stepped = _at_equal_steps(given, interval_s, cleaning)
     names, cleaned = list(raw), {each: clean(raw[each], cleaning) for each in raw}
     first = cleaned[names[0]].report
     own_s, has_time, notes = first.interval_s, cleaned[names[0]].longest.has_time, []
     for each, found in cleaned.items():
-        notes += [f"{name}, {each}: {finding.text}" for finding in found.report.findings if finding.action != "accepted"]
+        notes += [
+            f"{name}, {each}: {finding.text}"
+            for finding in found.report.findings
+            if finding.action != "accepted"
+        ]
     notes += [f"{name}: {finding.text}" for finding in first.findings if finding.kind in _NO_INPUTS]
     notes += [f"{name}: {stepped}"] if stepped else []
     grid_s = own_s if interval_s is None else float(interval_s)
@@ -70,12 +85,17 @@ def read_recording(
             f"Expected a coarse run with times, one sample every {grid_s:g} s. Received: {name} without times. Add a time column."
         )
     if own_s < (1 - SAME_RATE) * grid_s:
-        cleaned = {each: clean(raw[each], dataclasses.replace(cleaning, interval_s=grid_s)) for each in names}
+        cleaned = {
+            each: clean(raw[each], dataclasses.replace(cleaning, interval_s=grid_s))
+            for each in names
+        }
         notes.append(f"{name}: a sample every {own_s:g} s, averaged to one every {grid_s:g} s")
     elif own_s > (1 + SAME_RATE) * grid_s:
         notes.append(f"{name}: a sample every {own_s:g} s, interpolated to one every {grid_s:g} s")
     base, values = _on_one_grid(cleaned, grid_s)
-    shared = [(begin, end) for begin, end in runs_of(np.isfinite(values).all(axis=1)) if end - begin >= 2]
+    shared = [
+        (begin, end) for begin, end in runs_of(np.isfinite(values).all(axis=1)) if end - begin >= 2
+    ]
     if not shared:
         raise InputError(
             f"Expected coarse columns that share some time. Received: {', '.join(names)[:120]} in {name} without any. Fill the gaps."
@@ -84,10 +104,18 @@ def read_recording(
         notes.append(f"{name}: gaps, at which the run is split into {len(shared)} parts")
     used, offset_s = (*names, given[names[0]].index.name), 0.0 if has_time else base / 1e9
     table = given.rows_of(names[0])
-    others = [each for each in (() if table is None else table) if each not in used and not each.startswith(("column ", "Unnamed: "))]
+    others = [
+        each
+        for each in (() if table is None else table)
+        if each not in used and not each.startswith(("column ", "Unnamed: "))
+    ]
     parts = []
     for begin, end in shared:
-        rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(begin, end), cleaning) if others else []
+        rows = (
+            _nearest_rows(given[names[0]], base, grid_s, np.arange(begin, end), cleaning)
+            if others
+            else []
+        )
         carried = {each: table[each].iloc[rows].reset_index(drop=True) for each in others}
         parts.append(Run(values[begin:end], grid_s * begin + offset_s, carried))
     if start is not None:
@@ -96,10 +124,19 @@ def read_recording(
                 f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
             )
         base += _begin_ns(Telemetry(np.zeros(1, np.float32), start=start))
-    return Recording(tuple(parts), tuple(names), grid_s, iso_time(base) if has_time else None, name, tuple(map(printable, notes)))
+    return Recording(
+        tuple(parts),
+        tuple(names),
+        grid_s,
+        iso_time(base) if has_time else None,
+        name,
+        tuple(map(printable, notes)),
+    )
 
 
-def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning) -> tuple[dict[str, pd.Series], str]:
+def _at_equal_steps(
+    raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning
+) -> tuple[dict[str, pd.Series], str]:
     """Interpolates a run whose solver chose its steps, or wrote events between its steps, and says so; other runs stay as they are."""
     first = next(iter(raw.values()))
     if cleaning.interval_s is not None or not isinstance(first.index, pd.DatetimeIndex):
@@ -119,7 +156,9 @@ def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, clea
         interval = interval_s * 1e9
     elif regular < 0.5:
         interval = float(np.median(steps))
-    grid = times[0] + np.round(np.arange(np.floor((times[-1] - times[0]) / interval + 1e-6) + 1) * interval).astype(np.int64)
+    grid = times[0] + np.round(
+        np.arange(np.floor((times[-1] - times[0]) / interval + 1e-6) + 1) * interval
+    ).astype(np.int64)
     return {name: _interpolated(series, grid, cleaning) for name, series in raw.items()}, (
         f"steps from {steps.min() / 1e9:.4g} s to {steps.max() / 1e9:.4g} s, interpolated to one every {interval / 1e9:.6g} s; "
         f"of {len(first) - len(times):,} rows at the time of another, the last was taken"
@@ -128,16 +167,29 @@ def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, clea
 
 def _interpolated(series: pd.Series, grid: np.ndarray, cleaning: Cleaning) -> pd.Series:
     """Interpolates a series linearly at times in nanoseconds."""
-    decimal, places = cleaning.decimal or series.attrs.get("decimal"), series.attrs.get("places", ROWS)
-    values, _, _ = parse_numbers(series, str(series.name), cleaning.drop_bad, decimal, cleaning.missing_values, places)
+    decimal, places = (
+        cleaning.decimal or series.attrs.get("decimal"),
+        series.attrs.get("places", ROWS),
+    )
+    values, _, _ = parse_numbers(
+        series, str(series.name), cleaning.drop_bad, decimal, cleaning.missing_values, places
+    )
     times = series.index.as_unit("ns").asi8
     there = np.isfinite(values) & series.index.notna()
     known = pd.Series(values[there]).groupby(times[there]).last()
     if not len(known):
         return series
     inside = grid[(grid >= known.index[0]) & (grid <= known.index[-1])]
-    index = pd.DatetimeIndex(inside.view("datetime64[ns]"), name=series.index.name, tz=None if series.index.tz is None else "UTC")
-    found = pd.Series(np.interp(inside, known.index.to_numpy(np.float64), known.to_numpy()), index=index, name=series.name)
+    index = pd.DatetimeIndex(
+        inside.view("datetime64[ns]"),
+        name=series.index.name,
+        tz=None if series.index.tz is None else "UTC",
+    )
+    found = pd.Series(
+        np.interp(inside, known.index.to_numpy(np.float64), known.to_numpy()),
+        index=index,
+        name=series.name,
+    )
     found.attrs = {key: value for key, value in series.attrs.items() if key != "places"}
     return found
 
@@ -147,9 +199,13 @@ def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float) -> tuple[int, np
     base = min(_begin_ns(each.parts[0]) for each in cleaned.values())
     columns = []
     for name, each in cleaned.items():
-        runs = tuple(Run(part.values[:, None], (_begin_ns(part) - base) / 1e9) for part in each.parts)
+        runs = tuple(
+            Run(part.values[:, None], (_begin_ns(part) - base) / 1e9) for part in each.parts
+        )
         columns.append(Recording(runs, (name,), each.parts[0].interval_s))
-    end_s = max(each.parts[-1].offset_s + each.interval_s * (len(each.parts[-1]) - 1) for each in columns)
+    end_s = max(
+        each.parts[-1].offset_s + each.interval_s * (len(each.parts[-1]) - 1) for each in columns
+    )
     times = grid_s * np.arange(int(np.floor(end_s / grid_s + 1e-3)) + 1)
     return base, np.concatenate([each.at(times) for each in columns], axis=1)
 
@@ -158,7 +214,9 @@ def _begin_ns(part: Telemetry) -> int:
     return int(nanoseconds(part, 0, 1)[0])
 
 
-def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning) -> np.ndarray:
+def _nearest_rows(
+    raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning
+) -> np.ndarray:
     """Returns, for each grid point, the number of the series' row that is nearest in time."""
     if isinstance(raw.index, pd.RangeIndex):
         return np.clip(places + base // 10**9 - raw.index.start, 0, len(raw) - 1)
@@ -166,6 +224,8 @@ def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, 
     if stamps.tz is None:
         stamps = localize_times(stamps, cleaning.timezone or "UTC")
     rows = np.flatnonzero(stamps.notna())
-    known = pd.DataFrame({"time": stamps[rows].as_unit("ns").asi8, "row": rows}).sort_values("time", kind="stable")
+    known = pd.DataFrame({"time": stamps[rows].as_unit("ns").asi8, "row": rows}).sort_values(
+        "time", kind="stable"
+    )
     wanted = pd.DataFrame({"time": base + np.round(places * grid_s * 1e9).astype(np.int64)})
     return pd.merge_asof(wanted, known, on="time", direction="nearest")["row"].to_numpy()

@@ -43,13 +43,17 @@ class SquareWave:
     def __post_init__(self):
         numbers = (self.period_s, self.phase, self.duty, self.low, self.high)
         if not np.isfinite(numbers).all() or self.period_s <= 0 or not 0 < self.duty < 1:
-            raise InputError(f"Expected period_s > 0, 0 < duty < 1 and finite numbers. Received: {self}.")
+            raise InputError(
+                f"Expected period_s > 0, 0 < duty < 1 and finite numbers. Received: {self}."
+            )
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """Evaluates the wave at times in seconds; returns a float64 array of the same shape."""
         cycle = np.asarray(time_s, np.float64) / self.period_s + self.phase
         cycle -= np.floor(cycle)  # the same as a modulus, in a fraction of the time
-        return np.where(cycle < self.duty, float(self.low + (self.high - self.low)), float(self.low))
+        return np.where(
+            cycle < self.duty, float(self.low + (self.high - self.low)), float(self.low)
+        )
 
 
 class SquareWaveSimulator:
@@ -79,22 +83,39 @@ class SquareWaveSimulator:
     @property
     def levels(self) -> tuple[float, float]:
         """Lowest and highest level that the sum can reach."""
-        return sum(min(wave.low, wave.high) for wave in self.waves), sum(max(wave.low, wave.high) for wave in self.waves)
+        return sum(min(wave.low, wave.high) for wave in self.waves), sum(
+            max(wave.low, wave.high) for wave in self.waves
+        )
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """Evaluates the nominal sum at times in seconds; returns a float64 array of the same shape."""
         return sum(wave(time_s) for wave in self.waves)
 
-    def simulate(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
+    def simulate(
+        self,
+        time_s: np.ndarray,
+        scenario: Degraded | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> np.ndarray:
         """Simulates windows, float32 of shape `(windows, samples)`; the generator, None: one with seed 0, is for `friction` and `dropout`."""
         time_s = np.asarray(time_s, np.float64)
         if scenario is None or scenario.severity == 0:
             return self(time_s).astype(np.float32)
-        rng, onset = np.random.default_rng(0) if rng is None else rng, scenario.first_sample(time_s.shape[1])
+        rng, onset = (
+            np.random.default_rng(0) if rng is None else rng,
+            scenario.first_sample(time_s.shape[1]),
+        )
         shortest_s = min(wave.period_s for wave in self.waves)
-        return degrade(self, time_s, scenario.mode, scenario.severity, self.levels, shortest_s, rng, onset).astype(np.float32)
+        return degrade(
+            self, time_s, scenario.mode, scenario.severity, self.levels, shortest_s, rng, onset
+        ).astype(np.float32)
 
-    def run(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
+    def run(
+        self,
+        time_s: np.ndarray,
+        scenario: Degraded | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> np.ndarray:
         """Simulates one run, float32 of shape `(samples, 1)`, see `interface.CoarseSimulator.run`."""
         return self.simulate(np.asarray(time_s, np.float64)[None], scenario, rng)[0][:, None]
 
@@ -102,9 +123,13 @@ class SquareWaveSimulator:
     def fit(cls, telemetry: Telemetry) -> "SquareWaveSimulator":
         """Fits one square wave to telemetry by least squares; raises InputError if it is no `Telemetry`, or no period is found twice."""
         check_telemetry(telemetry)
-        frequency, begin, duty, low, high = fit_box(telemetry.values.astype(np.float64), telemetry.name)
+        frequency, begin, duty, low, high = fit_box(
+            telemetry.values.astype(np.float64), telemetry.name
+        )
         period_s = telemetry.interval_s / frequency
-        phase = np.mod(-begin - telemetry.offset_s / period_s, 1.0)  # relative to the zero of the series' time axis
+        phase = np.mod(
+            -begin - telemetry.offset_s / period_s, 1.0
+        )  # relative to the zero of the series' time axis
         return cls([SquareWave(period_s, float(phase), duty, low, high)])
 
 
@@ -129,7 +154,9 @@ class ConstantLevel(SquareWaveSimulator):
 
     def __init__(self, level: float, spread: float, period_s: float = 1.0):
         if not (np.isfinite([level, spread]).all() and spread > 0):
-            raise InputError(f"Expected a finite level and a spread above 0. Received: level={level}, spread={spread}.")
+            raise InputError(
+                f"Expected a finite level and a spread above 0. Received: level={level}, spread={spread}."
+            )
         super().__init__([SquareWave(period_s, low=float(level), high=float(level))])
         self.level, self.spread, self.period_s = float(level), float(spread), period_s
 
@@ -145,7 +172,9 @@ def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
     return (low + high) / 2, (high - low) / 2 or 1.0
 
 
-def fit_box(values: np.ndarray, name: str = "the series") -> tuple[float, float, float, float, float]:
+def fit_box(
+    values: np.ndarray, name: str = "the series"
+) -> tuple[float, float, float, float, float]:
     """Fits a square wave to a series of shape `(samples,)` by least squares; raises InputError with its name if no period is found.
 
     Returns frequency in cycles per sample, the phase at which the box begins, from 0 to 1, where sample 0 has phase 0, its share of the cycle, and
@@ -160,7 +189,9 @@ def fit_box(values: np.ndarray, name: str = "the series") -> tuple[float, float,
     power[: 2 * _OVERSAMPLING] = 0  # a period must occur at least twice
     peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:]))
     peaks = peaks[np.argsort(power[peaks])[::-1][:_NUM_PEAKS]]
-    trials = {peak / (_OVERSAMPLING * num_samples) / divisor for peak in peaks for divisor in (1, 2, 3)}
+    trials = {
+        peak / (_OVERSAMPLING * num_samples) / divisor for peak in peaks for divisor in (1, 2, 3)
+    }
     trials = sorted(trial for trial in trials if 2 / num_samples <= trial <= 0.25)
     if not trials:
         raise InputError(
@@ -171,7 +202,9 @@ def fit_box(values: np.ndarray, name: str = "the series") -> tuple[float, float,
     best = max(trials, key=lambda trial: _best_box(index * trial, centred)[0])
     step = 1 / (_OVERSAMPLING * num_samples)
     while step * num_samples > 1e-3:
-        best = max(best + step * np.arange(-4, 5), key=lambda trial: _best_box(index * trial, centred)[0])
+        best = max(
+            best + step * np.arange(-4, 5), key=lambda trial: _best_box(index * trial, centred)[0]
+        )
         step /= 3
     _, begin, duty = _best_box(index * best, centred)
     inside = np.mod(index * best - begin, 1.0) < duty
@@ -189,6 +222,8 @@ def _best_box(cycles: np.ndarray, centred: np.ndarray) -> tuple[float, float, fl
     total, number = totals[begin + width] - totals[begin], numbers[begin + width] - numbers[begin]
     rest = len(centred) - number
     with np.errstate(divide="ignore", invalid="ignore"):
-        explained = np.where((number > 0) & (rest > 0) & (total > 0), total**2 / number + total**2 / rest, 0) / len(centred)
+        explained = np.where(
+            (number > 0) & (rest > 0) & (total > 0), total**2 / number + total**2 / rest, 0
+        ) / len(centred)
     row, column = np.unravel_index(np.argmax(explained), explained.shape)
     return float(explained[row, column]), float(row / _NUM_BINS), float((column + 1) / _NUM_BINS)

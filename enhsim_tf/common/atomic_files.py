@@ -36,7 +36,9 @@ def _locked(path: Path, blocking: bool = True) -> Iterator[None]:
             yield
         finally:
             with contextlib.suppress(OSError):
-                os.unlink(lock.lock_file)  # while it is held: filelock notices that the file is another, and tries again
+                os.unlink(
+                    lock.lock_file
+                )  # while it is held: filelock notices that the file is another, and tries again
 
 
 def make_folder(path: str | os.PathLike) -> Path:
@@ -52,7 +54,9 @@ def make_folder(path: str | os.PathLike) -> Path:
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise InputError(f"Expected a folder that can be written to. Received: {path} ({error.strerror}). Name another.") from None
+        raise InputError(
+            f"Expected a folder that can be written to. Received: {path} ({error.strerror}). Name another."
+        ) from None
     return path
 
 
@@ -70,7 +74,9 @@ def replace_file(path: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] = lambda path: False) -> Iterator[Path]:
+def replace_folder(
+    path: str | os.PathLike, keep: Callable[[Path], bool] = lambda path: False
+) -> Iterator[Path]:
     """Yields a temporary folder. If the block succeeds, that folder replaces `path`; if it fails, `path` stays unchanged.
 
     Args:
@@ -118,11 +124,16 @@ def _remove(path: Path) -> None:
 def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None:
     """Removes what killed processes left in a folder, of this name if one is given, and restores old content that they had moved aside."""
     folder = Path(folder)
-    for left in {path.with_name(path.name.removesuffix(".lock")) for path in folder.glob(".*.enhsim_tf*")}:
+    for left in {
+        path.with_name(path.name.removesuffix(".lock")) for path in folder.glob(".*.enhsim_tf*")
+    }:
         named = _LEFT.fullmatch(left.name)
         if named is None or name not in (None, named["name"]):
             continue
-        with contextlib.suppress(filelock.Timeout), _locked(left, blocking=False):  # a running process holds the lock
+        with (
+            contextlib.suppress(filelock.Timeout),
+            _locked(left, blocking=False),
+        ):  # a running process holds the lock
             if named["kind"] == "old":
                 _restore(folder / named["name"])
             else:
@@ -132,7 +143,9 @@ def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None
 def write_json(path: str | os.PathLike, content: Any) -> None:
     """Writes `content` atomically as indented JSON, which has neither NaN nor infinity."""
     with replace_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        temporary.write_text(
+            json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
 
 
 def sha256(path: str | os.PathLike) -> str:

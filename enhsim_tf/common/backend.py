@@ -19,7 +19,10 @@ SETTINGS = {
     "KERAS_BACKEND": "tensorflow",
 }
 """Environment variables, and the values that they receive if the user has not set them. Child processes inherit them."""
-_ALLOCATOR = ("MALLOC_", "GLIBC_TUNABLES")  # prefixes of the variables that configure the memory allocator of glibc
+_ALLOCATOR = (
+    "MALLOC_",
+    "GLIBC_TUNABLES",
+)  # prefixes of the variables that configure the memory allocator of glibc
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # parameters of glibc's mallopt
 
 
@@ -43,12 +46,16 @@ def _keep_freed_memory() -> None:
     By default, it returns every block above 32 MB to the operating system, which then has to clear the same pages again for each
     gradient of the enhancer's widest layer.
     """
-    if not sys.platform.startswith("linux") or any(name.startswith(_ALLOCATOR) for name in os.environ):
+    if not sys.platform.startswith("linux") or any(
+        name.startswith(_ALLOCATOR) for name in os.environ
+    ):
         return
     import ctypes
 
     library = ctypes.CDLL(None)
-    if hasattr(library, "gnu_get_libc_version"):  # another C library, such as musl, lacks these settings
+    if hasattr(
+        library, "gnu_get_libc_version"
+    ):  # another C library, such as musl, lacks these settings
         library.mallopt(_M_MMAP_MAX, 0)
         library.mallopt(_M_TRIM_THRESHOLD, 2**31 - 1)
 
@@ -60,7 +67,9 @@ def _start() -> None:
         import tensorflow
 
         tensorflow.config.list_physical_devices()  # the first call prints messages about devices
-    tensorflow.get_logger().setLevel("ERROR")  # hides warnings about retraced graphs, which users cannot act on
+    tensorflow.get_logger().setLevel(
+        "ERROR"
+    )  # hides warnings about retraced graphs, which users cannot act on
 
 
 if (os.environ.get("KERAS_BACKEND") or "tensorflow") != "tensorflow":

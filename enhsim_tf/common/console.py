@@ -18,15 +18,24 @@ class Parser(argparse.ArgumentParser):
         """Raises an `InputError` for a command line that cannot be parsed."""
         missing = message.partition("arguments are required: ")[2]
         if missing:
-            raise InputError(f"Expected {missing}. Received: no such argument. See {self.prog} --help.")
-        raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
+            raise InputError(
+                f"Expected {missing}. Received: no such argument. See {self.prog} --help."
+            )
+        raise InputError(
+            f"Expected options as --help lists them. Received: {' '.join(message.split())}."
+        )
 
 
 def tell(line: str) -> None:
     """Prints a line at once, also through a pipe; what cannot be printed or encoded, for example in channel names, becomes a question mark."""
-    text, encoding = "\n".join(printable(each) for each in line.split("\n")), getattr(sys.stdout, "encoding", None) or "utf-8"
+    text, encoding = (
+        "\n".join(printable(each) for each in line.split("\n")),
+        getattr(sys.stdout, "encoding", None) or "utf-8",
+    )
     text = text.encode(encoding, "replace").decode(encoding)
-    print(f"{text}\n", end="", flush=True)  # text and line break in one write, since other processes may print at the same time
+    print(
+        f"{text}\n", end="", flush=True
+    )  # text and line break in one write, since other processes may print at the same time
 
 
 INTERVAL_S = 15.0  # seconds between two progress lines
@@ -35,7 +44,12 @@ INTERVAL_S = 15.0  # seconds between two progress lines
 class Progress:
     """Reports the progress of long work as lines of text, with which `tell` is called; each begins with `before`."""
 
-    def __init__(self, tell: Callable[[str], None], before: str = "", clock: Callable[[], float] = time.monotonic):
+    def __init__(
+        self,
+        tell: Callable[[str], None],
+        before: str = "",
+        clock: Callable[[], float] = time.monotonic,
+    ):
         self.tell, self.before, self.clock, self.last_line_s = tell, before, clock, clock()
 
     def step(self, what: str) -> None:
@@ -56,7 +70,9 @@ class Progress:
             if 0 < done < total and now - self.last_line_s >= INTERVAL_S:
                 self.last_line_s = now
                 left = _time_left((now - began) / done * (total - done))
-                self.tell(f"{self.before}{unit} {math.ceil(done):,} of {total:,}, {math.floor(100 * done / total)} %, {left}")
+                self.tell(
+                    f"{self.before}{unit} {math.ceil(done):,} of {total:,}, {math.floor(100 * done / total)} %, {left}"
+                )
 
         return told
 
@@ -67,7 +83,11 @@ SILENT = Progress(lambda line: None)
 def _time_left(seconds: float) -> str:
     if seconds < 120:
         return f"about {max(1, round(seconds))} s left"
-    return f"about {round(seconds / 60)} min left" if seconds < 7_200 else f"about {seconds / 3_600:.1f} h left"
+    return (
+        f"about {round(seconds / 60)} min left"
+        if seconds < 7_200
+        else f"about {seconds / 3_600:.1f} h left"
+    )
 
 
 def run_command(run: Callable[[], int], interrupted: str) -> int:
@@ -87,7 +107,9 @@ def run_command(run: Callable[[], int], interrupted: str) -> int:
         return 141
     except (OSError, MemoryError) as error:
         reason = " ".join(str(error).splitlines())[:300] or "too little memory"
-        line = InputError(f"Expected enough memory and files that can be used. Received: {reason}. Free some space, or ask for less.")
+        line = InputError(
+            f"Expected enough memory and files that can be used. Received: {reason}. Free some space, or ask for less."
+        )
         print(f"error: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -4,10 +4,18 @@ import os
 import re
 from collections.abc import Sequence
 
-_MAX_CHARACTERS, _END = 600, 150  # a longer message loses its middle; its last 150 characters, which say what to do, stay
-_PASSWORD = re.compile(r"(?<=//)[^/@\s]*:(?!\d+/)[^@]{0,200}@|(?<![^\s'\"(=])[^@/:\s'\"(=]+:[^@/\s]+@(?=[^\s@]*:\d)")
+_MAX_CHARACTERS, _END = (
+    600,
+    150,
+)  # a longer message loses its middle; its last 150 characters, which say what to do, stay
+_PASSWORD = re.compile(
+    r"(?<=//)[^/@\s]*:(?!\d+/)[^@]{0,200}@|(?<![^\s'\"(=])[^@/:\s'\"(=]+:[^@/\s]+@(?=[^\s@]*:\d)"
+)
 """Matches `user:password@` in a URL, either after `//` or, in an address without a scheme, before `host:port`."""
-_TOKEN, _MIN_TOKEN_CHARACTERS = "INFLUXDB_V2_TOKEN", 8  # a shorter token may be an ordinary word of a message, so it is not masked
+_TOKEN, _MIN_TOKEN_CHARACTERS = (
+    "INFLUXDB_V2_TOKEN",
+    8,
+)  # a shorter token may be an ordinary word of a message, so it is not masked
 
 
 class InputError(ValueError):
@@ -23,7 +31,9 @@ class InputError(ValueError):
     def __init__(self, message: str = ""):
         line = printable(" ".join(str(message).splitlines()))
         token = os.environ.get(_TOKEN, "")
-        for form in (token, repr(token)[1:-1]) if len(token) >= _MIN_TOKEN_CHARACTERS else ():  # plain, and escaped by repr()
+        for form in (
+            (token, repr(token)[1:-1]) if len(token) >= _MIN_TOKEN_CHARACTERS else ()
+        ):  # plain, and escaped by repr()
             line = line.replace(form, "***")
         line = _PASSWORD.sub("***@", line)
         if len(line) > _MAX_CHARACTERS:

@@ -42,7 +42,12 @@ def adam_step(adam: keras.optimizers.Adam, learning_rate: tf.Tensor | None = Non
 
 
 def apply_adam(
-    adam: keras.optimizers.Adam, weight: tf.Variable, momentum: tf.Variable, velocity: tf.Variable, gradient: tf.Tensor, step: AdamStep
+    adam: keras.optimizers.Adam,
+    weight: tf.Variable,
+    momentum: tf.Variable,
+    velocity: tf.Variable,
+    gradient: tf.Tensor,
+    step: AdamStep,
 ) -> tf.Operation:
     """Updates a variable and its two moments. It does not advance the optimiser's iteration counter."""
     return tf.raw_ops.ResourceApplyAdam(
@@ -59,14 +64,19 @@ def apply_adam(
     )
 
 
-def fused_adam(learning_rate: float | keras.optimizers.schedules.LearningRateSchedule) -> keras.optimizers.Adam:
+def fused_adam(
+    learning_rate: float | keras.optimizers.schedules.LearningRateSchedule,
+) -> keras.optimizers.Adam:
     """Creates a Keras Adam optimiser that updates each variable by one fused operation, and is in all else standard."""
     adam = keras.optimizers.Adam(learning_rate)
 
     def update_step(gradient: tf.Tensor, variable: tf.Variable, learning_rate: tf.Tensor) -> None:
         index = adam._get_variable_index(variable)
         # the fused operation needs the handles of the TensorFlow variables, which Keras wraps
-        held = (getattr(each, "_value", each) for each in (variable, adam._momentums[index], adam._velocities[index]))
+        held = (
+            getattr(each, "_value", each)
+            for each in (variable, adam._momentums[index], adam._velocities[index])
+        )
         apply_adam(adam, *held, gradient, adam_step(adam, learning_rate))
 
     adam.update_step = update_step
@@ -98,7 +108,9 @@ class _Weight(NamedTuple):
 
 
 def _weight_of(values: np.ndarray) -> _Weight:
-    return _Weight(*(tf.Variable(each) for each in (values, np.zeros_like(values), np.zeros_like(values))))
+    return _Weight(
+        *(tf.Variable(each) for each in (values, np.zeros_like(values), np.zeros_like(values)))
+    )
 
 
 class _BlockedDense:
@@ -117,11 +129,19 @@ class _BlockedDense:
 
     def __call__(self, inputs: tf.Tensor) -> tf.Tensor:
         parts = zip(self.parts_of(inputs), self.blocks, strict=True)
-        outputs = tf.add_n([tf.matmul(part, block.value) for part, block in parts]) + self.bias.value
+        outputs = (
+            tf.add_n([tf.matmul(part, block.value) for part, block in parts]) + self.bias.value
+        )
         return tf.nn.relu(outputs) if self.is_relu else outputs
 
     def update(
-        self, inputs: tf.Tensor, outputs: tf.Tensor, upstream: tf.Tensor, adam: keras.optimizers.Adam, step: AdamStep, is_first: bool
+        self,
+        inputs: tf.Tensor,
+        outputs: tf.Tensor,
+        upstream: tf.Tensor,
+        adam: keras.optimizers.Adam,
+        step: AdamStep,
+        is_first: bool,
     ) -> tf.Tensor | None:
         """Updates the weights and returns the gradient of the inputs, or None for the first layer, where it is not needed."""
         if self.is_relu:
@@ -132,7 +152,9 @@ class _BlockedDense:
             with tf.control_dependencies(before):
                 gradient = tf.matmul(part, upstream, transpose_a=True)
                 belows += [] if is_first else [tf.matmul(upstream, block.value, transpose_b=True)]
-            with tf.control_dependencies(belows[-1:]):  # the gradient of the inputs needs the weights before the update
+            with tf.control_dependencies(
+                belows[-1:]
+            ):  # the gradient of the inputs needs the weights before the update
                 before = [apply_adam(adam, *block, gradient, step)]
         apply_adam(adam, *self.bias, tf.reduce_sum(upstream, axis=0), step)
         return None if is_first else tf.concat(belows, axis=1)
@@ -177,7 +199,9 @@ class BlockwiseTraining(keras.Model):
             loss = self.compute_loss(inputs, targets, outputs)
         upstream, step = tape.gradient(loss, outputs), adam_step(self.optimizer)
         for number, layer in reversed(list(enumerate(self._stack.layers))):
-            upstream = layer.update(*activations[number : number + 2], upstream, self.optimizer, step, number == 0)
+            upstream = layer.update(
+                *activations[number : number + 2], upstream, self.optimizer, step, number == 0
+            )
         self.optimizer.iterations.assign_add(1)
         for metric in self.metrics:
             metric.update_state(loss, sample_weight=tf.shape(inputs)[0])
@@ -186,14 +210,24 @@ class BlockwiseTraining(keras.Model):
     def write_back(self) -> None:
         """Copies the trained weights to the network."""
         for each in self._stack.layers:
-            each.layer.set_weights([np.concatenate([block.value.numpy() for block in each.blocks]), each.bias.value.numpy()])
+            each.layer.set_weights(
+                [
+                    np.concatenate([block.value.numpy() for block in each.blocks]),
+                    each.bias.value.numpy(),
+                ]
+            )
 
 
 def is_wide_dense_stack(network: keras.Model) -> bool:
     """Returns whether a model is a stack of plain relu or linear Dense layers, at least one with a kernel larger than `BLOCK_BYTES`."""
     activations = (keras.activations.relu, keras.activations.linear)
-    are_plain = all(type(layer) is keras.layers.Dense and layer.use_bias and layer.activation in activations for layer in network.layers)
-    if not are_plain or network.losses or len(network.trainable_weights) < len(network.weights):  # losses are those of regularisers
+    are_plain = all(
+        type(layer) is keras.layers.Dense and layer.use_bias and layer.activation in activations
+        for layer in network.layers
+    )
+    if (
+        not are_plain or network.losses or len(network.trainable_weights) < len(network.weights)
+    ):  # losses are those of regularisers
         return False
     return any(math.prod(layer.kernel.shape) * 4 > BLOCK_BYTES for layer in network.layers)
 
@@ -219,7 +253,12 @@ _BLOCK_ROWS = 10  # number of rows in a block, whose products take 2.4 MB with 5
 
 
 def convolution_maximum(
-    rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor, stride: int, rate: float = 0.0, seed: tf.Tensor | None = None
+    rows: tf.Tensor,
+    kernel: tf.Tensor,
+    bias: tf.Tensor,
+    stride: int,
+    rate: float = 0.0,
+    seed: tf.Tensor | None = None,
 ) -> tf.Tensor:
     """Computes `GlobalMaxPooling1D()(Dropout(rate)(Conv1D(filters, width, stride, activation="relu")(rows)))`.
 
@@ -236,7 +275,10 @@ def convolution_maximum(
     """
     blocks = [rows[first : first + _BLOCK_ROWS] for first in range(0, rows.shape[0], _BLOCK_ROWS)]
     seeds = tf.unstack(tf.random.split(seed, len(blocks))) if rate else [None] * len(blocks)
-    highest = [_block(block, kernel, bias, stride, rate, seed) for block, seed in zip(blocks, seeds, strict=True)]
+    highest = [
+        _block(block, kernel, bias, stride, rate, seed)
+        for block, seed in zip(blocks, seeds, strict=True)
+    ]
     return tf.concat(highest, axis=0) / (1 - rate)
 
 
@@ -248,7 +290,9 @@ class ConvolutionMaximum(keras.layers.Layer):
         dropout: The Dropout after it, or None.
     """
 
-    def __init__(self, convolution: keras.layers.Conv1D, dropout: keras.layers.Dropout | None = None):
+    def __init__(
+        self, convolution: keras.layers.Conv1D, dropout: keras.layers.Dropout | None = None
+    ):
         super().__init__()
         self.convolution, self.dropout = convolution, dropout
 
@@ -258,9 +302,18 @@ class ConvolutionMaximum(keras.layers.Layer):
 
     def call(self, rows: tf.Tensor, training: bool = False) -> tf.Tensor:
         """Applies `convolution_maximum` to rows of shape `(rows, samples, 1)`, whose number is static."""
-        kernel, bias = (tf.convert_to_tensor(weight) for weight in (self.convolution.kernel, self.convolution.bias))
-        drops = {"rate": self.dropout.rate, "seed": self.dropout.seed_generator.next()} if self.dropout and training else {}
-        return convolution_maximum(tf.squeeze(rows, 2), tf.squeeze(kernel, 1), bias, self.convolution.strides[0], **drops)
+        kernel, bias = (
+            tf.convert_to_tensor(weight)
+            for weight in (self.convolution.kernel, self.convolution.bias)
+        )
+        drops = (
+            {"rate": self.dropout.rate, "seed": self.dropout.seed_generator.next()}
+            if self.dropout and training
+            else {}
+        )
+        return convolution_maximum(
+            tf.squeeze(rows, 2), tf.squeeze(kernel, 1), bias, self.convolution.strides[0], **drops
+        )
 
 
 def with_fast_convolution(discriminator: keras.Sequential) -> keras.Sequential:
@@ -276,10 +329,19 @@ def with_fast_convolution(discriminator: keras.Sequential) -> keras.Sequential:
     dropouts = others[: isinstance(others[0], keras.layers.Dropout)]
     fast = ConvolutionMaximum(convolution, *dropouts)
     rest = others[len(dropouts) + 1 :]
-    return keras.Sequential([keras.Input(discriminator.input_shape[1:]), fast, *rest], name=discriminator.name)
+    return keras.Sequential(
+        [keras.Input(discriminator.input_shape[1:]), fast, *rest], name=discriminator.name
+    )
 
 
-def _block(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor, stride: int, rate: float, seed: tf.Tensor | None) -> tf.Tensor:
+def _block(
+    rows: tf.Tensor,
+    kernel: tf.Tensor,
+    bias: tf.Tensor,
+    stride: int,
+    rate: float,
+    seed: tf.Tensor | None,
+) -> tf.Tensor:
     (width, filters), (num_rows, samples) = kernel.shape, rows.shape
     num_frames = (samples - width) // stride + 1
     num_parts = width // stride  # number of parts of a frame, each `stride` samples long
@@ -287,29 +349,43 @@ def _block(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor, stride: int, rat
 
     def frames_of(rows: tf.Tensor) -> tf.Tensor:
         row_parts = tf.reshape(rows[:, : num_row_parts * stride], (num_rows, num_row_parts, stride))
-        return tf.concat([row_parts[:, part : part + num_frames] for part in range(num_parts)], axis=2)
+        return tf.concat(
+            [row_parts[:, part : part + num_frames] for part in range(num_parts)], axis=2
+        )
 
     def add_frames(frames: tf.Tensor) -> tf.Tensor:
         parts = tf.split(frames, num_parts, axis=2)
-        placed = [tf.pad(part, ((0, 0), (number, num_parts - 1 - number), (0, 0))) for number, part in enumerate(parts)]
+        placed = [
+            tf.pad(part, ((0, 0), (number, num_parts - 1 - number), (0, 0)))
+            for number, part in enumerate(parts)
+        ]
         left_over = samples - num_row_parts * stride
-        return tf.pad(tf.reshape(tf.add_n(placed), (num_rows, num_row_parts * stride)), ((0, 0), (0, left_over)))
+        return tf.pad(
+            tf.reshape(tf.add_n(placed), (num_rows, num_row_parts * stride)),
+            ((0, 0), (0, left_over)),
+        )
 
     @tf.custom_gradient
     def forward(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor) -> tuple:
         frames = frames_of(rows)
-        products = tf.reshape(tf.reshape(frames, (-1, width)) @ kernel, (num_rows, num_frames, filters))
+        products = tf.reshape(
+            tf.reshape(frames, (-1, width)) @ kernel, (num_rows, num_frames, filters)
+        )
         if rate:
             products = tf.where(_kept(products.shape, rate, seed), products, -float("inf"))
         highest = tf.reduce_max(products, axis=1)
         outputs = tf.nn.relu(highest + bias)
         won = tf.equal(products, highest[:, None])
         frames_and_one = tf.concat([frames, tf.ones((num_rows, num_frames, 1))], axis=2)
-        of_winners = tf.matmul(frames_and_one, tf.cast(won, tf.float32), transpose_a=True)  # (rows, width + 1, filters)
+        of_winners = tf.matmul(
+            frames_and_one, tf.cast(won, tf.float32), transpose_a=True
+        )  # (rows, width + 1, filters)
 
         def backward(upstream: tf.Tensor) -> tuple:
             fired = tf.where(outputs > 0, upstream, 0.0)
-            to_kernel = tf.reduce_sum((fired / of_winners[:, -1])[:, None] * of_winners[:, :-1], axis=0)
+            to_kernel = tf.reduce_sum(
+                (fired / of_winners[:, -1])[:, None] * of_winners[:, :-1], axis=0
+            )
 
             winners = tf.cast(won, tf.float32)
             at_winners = winners * (fired / tf.reduce_sum(winners, axis=1))[:, None]
@@ -325,6 +401,8 @@ def _block(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor, stride: int, rat
 def _kept(shape: tf.TensorShape, rate: float, seed: tf.Tensor) -> tf.Tensor:
     """Draws a mask that is True with probability 1 - `rate`. Random bits are expensive, so 32 of them give two elements."""
     number = shape.num_elements()
-    words = tf.random.stateless_uniform(((number + 1) // 2,), seed, minval=None, maxval=None, dtype=tf.uint32)
+    words = tf.random.stateless_uniform(
+        ((number + 1) // 2,), seed, minval=None, maxval=None, dtype=tf.uint32
+    )
     draws = tf.reshape(tf.bitcast(words, tf.uint16), (-1,))[:number]
     return tf.reshape(draws >= tf.constant(round(rate * 2**16), tf.uint16), shape)

@@ -36,7 +36,14 @@ class Figure:
             return self.drawn_by(data)
 
 
-def save(figure: Figure, name: str, data: Mapping[str, np.ndarray], folder: str | os.PathLike, caption: str, is_smoke: bool) -> list[Path]:
+def save(
+    figure: Figure,
+    name: str,
+    data: Mapping[str, np.ndarray],
+    folder: str | os.PathLike,
+    caption: str,
+    is_smoke: bool,
+) -> list[Path]:
     """Draws a figure and writes it with its caption line. The same data give the same bytes.
 
     Args:
@@ -56,12 +63,22 @@ def save(figure: Figure, name: str, data: Mapping[str, np.ndarray], folder: str 
     small = {"size": 7, "color": QUIET, "linespacing": 1.05, "parse_math": False}
     drawn.text(EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
     if is_smoke:
-        mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
-        drawn.text(0.5, 0.5, "SMOKE BUDGET", **mark, ha="center", va="center", zorder=10, gid="watermark")
+        mark = {
+            "size": 6.2 * width,
+            "weight": "bold",
+            "color": GENERATED,
+            "alpha": 0.22,
+            "rotation": 15,
+        }
+        drawn.text(
+            0.5, 0.5, "SMOKE BUDGET", **mark, ha="center", va="center", zorder=10, gid="watermark"
+        )
     paths = [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg")]
     with matplotlib.style.context(STYLE):
         for path in paths:
             undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
             with replace_file(path) as temporary:
-                drawn.savefig(temporary, metadata={"Title": figure.title, "Description": figure.alt} | undated)
+                drawn.savefig(
+                    temporary, metadata={"Title": figure.title, "Description": figure.alt} | undated
+                )
     return paths

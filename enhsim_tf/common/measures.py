@@ -29,7 +29,9 @@ def effective_rank(windows: np.ndarray) -> float:
     """
     centred = np.asarray(windows, np.float64) - np.mean(windows, axis=0, dtype=np.float64)
     energy = np.linalg.svd(centred, compute_uv=False) ** 2
-    if not energy.sum() > 0:  # equal windows occupy no dimension; the exponential of an empty sum is 1
+    if (
+        not energy.sum() > 0
+    ):  # equal windows occupy no dimension; the exponential of an empty sum is 1
         return 1.0
     share = energy / energy.sum()
     share = share[share > 0]
@@ -44,7 +46,10 @@ def lagged_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
     """
     centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
     samples = centred.shape[1]
-    products = [np.einsum("ws,ws->w", centred[:, : samples - lag], centred[:, lag:]) / (samples - lag) for lag in range(max_lag + 1)]
+    products = [
+        np.einsum("ws,ws->w", centred[:, : samples - lag], centred[:, lag:]) / (samples - lag)
+        for lag in range(max_lag + 1)
+    ]
     return np.stack(products, axis=1)
 
 
@@ -60,7 +65,11 @@ def scale_difference(generated: np.ndarray, real: np.ndarray) -> float:
     It is infinite if one of the two does not vary.
     """
     scales = [float(np.std(each, dtype=np.float64)) for each in (generated, real)]
-    return float(abs(np.log(scales[0] / scales[1]))) if all(scales) else float(0 if scales[0] == scales[1] else np.inf)
+    return (
+        float(abs(np.log(scales[0] / scales[1])))
+        if all(scales)
+        else float(0 if scales[0] == scales[1] else np.inf)
+    )
 
 
 def marginal_distance(generated: np.ndarray, real: np.ndarray) -> float:
@@ -77,4 +86,6 @@ def _quantiles(values: np.ndarray) -> np.ndarray:
     ordered = np.sort(values, axis=None)
     place = (np.arange(2_000) + 0.5) / 2_000 * (ordered.size - 1)
     below = place.astype(int)
-    return ordered[below] + (place - below) * (ordered[np.minimum(below + 1, ordered.size - 1)] - ordered[below])
+    return ordered[below] + (place - below) * (
+        ordered[np.minimum(below + 1, ordered.size - 1)] - ordered[below]
+    )

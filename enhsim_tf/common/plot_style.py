@@ -15,9 +15,17 @@ from matplotlib.axes import Axes
 
 STYLE = ("default", Path(__file__).with_name("style.mplstyle"))  # for `matplotlib.style.context`
 REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
-RESIDUALS, RIDGE, LEARNT = "#009e73", "#56b4e9", "#cc79a7"  # residual windows, ridge regression, other learnt noise
+RESIDUALS, RIDGE, LEARNT = (
+    "#009e73",
+    "#56b4e9",
+    "#cc79a7",
+)  # residual windows, ridge regression, other learnt noise
 QUIET, LINE = "#595959", "#8c8c8c"  # secondary text; outlines
-IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker colours for text that names a curve
+IN_PRINT = {
+    COARSE: QUIET,
+    GENERATED: "#b85000",
+    AVERAGE: "#946300",
+}  # darker colours for text that names a curve
 DASHED = (0, (4, 2))  # line style of the second curve of a panel
 GREY_TINT = "#f3f3f3"
 SINGLE, DOUBLE = 3.5, 7.2  # widths of one and two journal columns, in inches
@@ -25,7 +33,9 @@ FOOT = 0.26  # free space for the caption line at the bottom of each figure, in 
 EDGE = 0.10  # distance from the edges of the figure to its text, in inches
 
 
-def new_sheet(width: float, height: float, title: str, subtitle: str = "") -> tuple[matplotlib.figure.Figure, float]:
+def new_sheet(
+    width: float, height: float, title: str, subtitle: str = ""
+) -> tuple[matplotlib.figure.Figure, float]:
     """Creates an empty figure with a title, the main message, and a subtitle that qualifies it.
 
     Returns:
@@ -33,9 +43,20 @@ def new_sheet(width: float, height: float, title: str, subtitle: str = "") -> tu
     """
     figure = matplotlib.figure.Figure(figsize=(width, height))
     down = 0.10
-    for text, size, weight, color, letters_an_inch in ((title, 9, "bold", REAL, 13.5), (subtitle, 7.5, "normal", QUIET, 18.5)):
+    for text, size, weight, color, letters_an_inch in (
+        (title, 9, "bold", REAL, 13.5),
+        (subtitle, 7.5, "normal", QUIET, 18.5),
+    ):
         for line in textwrap.wrap(text, int((width - 2 * EDGE) * letters_an_inch)):
-            figure.text(EDGE / width, 1 - (down + size / 72) / height, line, size=size, weight=weight, color=color, parse_math=False)
+            figure.text(
+                EDGE / width,
+                1 - (down + size / 72) / height,
+                line,
+                size=size,
+                weight=weight,
+                color=color,
+                parse_math=False,
+            )
             down += 1.35 * size / 72
         down += 0.04
     return figure, down
@@ -84,13 +105,27 @@ def name_axes(axes: np.ndarray, data: Mapping[str, Any]) -> None:
     """Labels the time axis and the value axis of a grid once, with their units."""
     figure, (width, height) = axes[0, 0].figure, axes[0, 0].figure.get_size_inches()
     last, first = axes[-1, -1].get_position(), axes[0, 0].get_position()
-    figure.text((first.x0 + last.x1) / 2, (FOOT + 0.04) / height, f"time ({data['time_unit']})", ha="center")
-    figure.text(0.17 / width, (first.y1 + last.y0) / 2, f"value ({data['unit']})", rotation=90, ha="center", va="center")
+    figure.text(
+        (first.x0 + last.x1) / 2, (FOOT + 0.04) / height, f"time ({data['time_unit']})", ha="center"
+    )
+    figure.text(
+        0.17 / width,
+        (first.y1 + last.y0) / 2,
+        f"value ({data['unit']})",
+        rotation=90,
+        ha="center",
+        va="center",
+    )
 
 
 def beside(axes: Axes, height: float, text: str, color: str) -> None:
     """Puts a label to the right of the axes, at a height from 0 to 1 of them, in the colour of its curve or darker."""
-    style = {"color": IN_PRINT.get(color, color), "va": "center", "linespacing": 1.05, "annotation_clip": False}
+    style = {
+        "color": IN_PRINT.get(color, color),
+        "va": "center",
+        "linespacing": 1.05,
+        "annotation_clip": False,
+    }
     axes.annotate(text, (1, height), (5, 0), "axes fraction", "offset points", **style)
 
 
@@ -98,7 +133,9 @@ def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
     """Labels the right ends of curves, given for each label as values and colour, and moves labels apart that would overlap."""
     low, high = axes.get_ylim()
     inches = axes.get_position().height * axes.figure.get_size_inches()[1]
-    ends = sorted((float(np.ravel(values)[-1]), name, color) for name, (values, color) in curves.items())
+    ends = sorted(
+        (float(np.ravel(values)[-1]), name, color) for name, (values, color) in curves.items()
+    )
     at = np.array([(value - low) / (high - low) for value, _, _ in ends])
     needed = np.array([0.13 * (1 + name.count("\n")) / inches for _, name, _ in ends])
     for _ in range(200):  # move overlapping neighbours apart until none overlap

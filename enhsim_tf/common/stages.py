@@ -17,10 +17,20 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, replace_file, replace_folder, sha256, write_json
+from enhsim_tf.common.atomic_files import (
+    make_folder,
+    remove_leftovers,
+    replace_file,
+    replace_folder,
+    sha256,
+    write_json,
+)
 from enhsim_tf.common.console import SILENT, Progress
 
-VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
+VERSIONS = {
+    name: importlib.metadata.version(name)
+    for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")
+}
 
 
 def default_cache() -> Path:
@@ -28,7 +38,11 @@ def default_cache() -> Path:
     if "ENHSIM_TF_CACHE" in os.environ:
         return Path(os.environ["ENHSIM_TF_CACHE"])
     checkout = Path(__file__).parents[2]
-    return checkout / ".cache" if (checkout / "pyproject.toml").exists() else Path.home() / ".cache" / "enhsim_tf"
+    return (
+        checkout / ".cache"
+        if (checkout / "pyproject.toml").exists()
+        else Path.home() / ".cache" / "enhsim_tf"
+    )
 
 
 class Stages:
@@ -41,7 +55,13 @@ class Stages:
         speaks: Whether a long stage also tells how far it is.
     """
 
-    def __init__(self, cache: Path, fresh: bool = False, tell: Callable[[str], None] = print, speaks: bool = False):
+    def __init__(
+        self,
+        cache: Path,
+        fresh: bool = False,
+        tell: Callable[[str], None] = print,
+        speaks: bool = False,
+    ):
         self.cache, self.fresh, self.tell, self.speaks = make_folder(cache), fresh, tell, speaks
         remove_leftovers(self.cache)
         self.seconds: dict[str, float] = {}
@@ -49,7 +69,14 @@ class Stages:
         self.progress = SILENT  # of the stage that is being run
         self._keys: dict[str, str] = {}
 
-    def run(self, name: str, make: Callable[[Path], None], settings: Any, after: Iterable[str] = (), version: int = 1) -> Path:
+    def run(
+        self,
+        name: str,
+        make: Callable[[Path], None],
+        settings: Any,
+        after: Iterable[str] = (),
+        version: int = 1,
+    ) -> Path:
         """Runs a stage, or finds it in the cache.
 
         Args:
@@ -62,7 +89,13 @@ class Stages:
         Returns:
             The folder with the stage's results.
         """
-        depends = [name, repr(settings), version, VERSIONS, [self._keys[before] for before in after]]
+        depends = [
+            name,
+            repr(settings),
+            version,
+            VERSIONS,
+            [self._keys[before] for before in after],
+        ]
         key = self._keys[name] = hashlib.sha256(json.dumps(depends).encode()).hexdigest()[:16]
         folder = self.cache / f"{name}-{key}"
         is_there = not self.fresh and os.path.lexists(folder)
@@ -73,7 +106,9 @@ class Stages:
         if done is None:
             done = self._run(name, make, folder)
         self.seconds[name] = done["seconds"]
-        self.tell(f"{name:12} {self.seconds[name]:7.1f} s{'  (from the cache)' if self.cached[name] else ''}")
+        self.tell(
+            f"{name:12} {self.seconds[name]:7.1f} s{'  (from the cache)' if self.cached[name] else ''}"
+        )
         return folder
 
     def _run(self, name: str, make: Callable[[Path], None], folder: Path) -> dict[str, Any]:
@@ -81,7 +116,9 @@ class Stages:
         self.tell(f"{name:12} ...")
         began, outer = time.perf_counter(), self.progress
         # if two runs make the same stage, the first result is kept, because the other run may read it
-        with replace_folder(folder, keep=lambda path: not self.fresh and _read(path) is not None) as temporary:
+        with replace_folder(
+            folder, keep=lambda path: not self.fresh and _read(path) is not None
+        ) as temporary:
             self.progress = Progress(self.tell, f"{name:12} ") if self.speaks else SILENT
             try:
                 make(temporary)
@@ -103,7 +140,11 @@ def _read(folder: Path) -> dict[str, Any] | None:
 
 def _checksums(folder: Path) -> dict[str, str]:
     """The checksum of each file of a stage but `stage.json`; hidden ones are the system's."""
-    paths = [path for path in sorted(folder.rglob("[!.]*")) if path.is_file() and path != folder / "stage.json"]
+    paths = [
+        path
+        for path in sorted(folder.rglob("[!.]*"))
+        if path.is_file() and path != folder / "stage.json"
+    ]
     return {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
 
 

@@ -26,12 +26,25 @@ def window_features(windows: np.ndarray) -> np.ndarray:
     correlation = np.mean(centred[:, 1:] * centred[:, :-1], axis=1) / variance
     power = np.abs(np.fft.rfft(centred, axis=1)) ** 2
     edges = np.unique(np.rint(np.geomspace(1, power.shape[1], 9)).astype(int))
-    bands = [np.log(power[:, a:b].mean(axis=1) + tiny) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    columns = [mean, np.log(variance) / 2, kurtosis, values.max(axis=1), np.log(steps + tiny), correlation, *bands]
+    bands = [
+        np.log(power[:, a:b].mean(axis=1) + tiny)
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    ]
+    columns = [
+        mean,
+        np.log(variance) / 2,
+        kurtosis,
+        values.max(axis=1),
+        np.log(steps + tiny),
+        correlation,
+        *bands,
+    ]
     return np.stack(columns, axis=1)
 
 
-def boosted_trees(generated_features: np.ndarray, real_features: np.ndarray, seed: int = 0) -> float:
+def boosted_trees(
+    generated_features: np.ndarray, real_features: np.ndarray, seed: int = 0
+) -> float:
     """Classifier two-sample test (Lopez-Paz and Oquab 2017) with gradient-boosted trees and fixed hyperparameters.
 
     Args:
@@ -47,10 +60,17 @@ def boosted_trees(generated_features: np.ndarray, real_features: np.ndarray, see
     """
     from sklearn.ensemble import HistGradientBoostingClassifier
 
-    return held_out_auc(HistGradientBoostingClassifier(random_state=seed), "predict_proba", generated_features, real_features)
+    return held_out_auc(
+        HistGradientBoostingClassifier(random_state=seed),
+        "predict_proba",
+        generated_features,
+        real_features,
+    )
 
 
-def held_out_auc(classifier: Any, method: str, generated_features: np.ndarray, real_features: np.ndarray) -> float:
+def held_out_auc(
+    classifier: Any, method: str, generated_features: np.ndarray, real_features: np.ndarray
+) -> float:
     """The same as `boosted_trees` for a classifier of scikit-learn and the method that gives its scores."""
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import cross_val_predict
@@ -58,12 +78,18 @@ def held_out_auc(classifier: Any, method: str, generated_features: np.ndarray, r
 
     number = min(len(generated_features), len(real_features))
     if number < 2 * _FOLDS:
-        raise InputError(f"Expected at least {2 * _FOLDS} windows of each kind. Received: {number}.")
+        raise InputError(
+            f"Expected at least {2 * _FOLDS} windows of each kind. Received: {number}."
+        )
     features = np.concatenate([generated_features[:number], real_features[:number]])
     labels = np.repeat([1, 0], number)
     folds = np.tile(np.arange(number) * _FOLDS // number, 2)
-    splits = [(np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)) for fold in range(_FOLDS)]
-    with threadpool_limits(1):  # on a busy machine, several threads that wait for each other are ten times slower
+    splits = [
+        (np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)) for fold in range(_FOLDS)
+    ]
+    with threadpool_limits(
+        1
+    ):  # on a busy machine, several threads that wait for each other are ten times slower
         scores = cross_val_predict(classifier, features, labels, cv=splits, method=method)
     return float(roc_auc_score(labels, scores[:, 1] if scores.ndim == 2 else scores))
 

@@ -23,14 +23,24 @@ from enhsim_tf.common.atomic_files import remove_leftovers, sha256, write_json
 from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel import engines
-from enhsim_tf.datasets.labelled_windows import FORMAT, Plan, ShardMaker, finished_shards, shard_file
+from enhsim_tf.datasets.labelled_windows import (
+    FORMAT,
+    Plan,
+    ShardMaker,
+    finished_shards,
+    shard_file,
+)
 
 MANIFEST, _LOCK = "_manifest.json", ".lock"  # readers of Parquet folders skip such names
 _SHARD = re.compile(r"shard-(\d{6,})\.parquet")
 
 
 def generate_data_set(
-    out: str | os.PathLike, plan: Plan, workers: int | None = None, engine: str = "local", tell: Callable[[str], None] = print
+    out: str | os.PathLike,
+    plan: Plan,
+    workers: int | None = None,
+    engine: str = "local",
+    tell: Callable[[str], None] = print,
 ) -> None:
     """Generates a data set, or the missing shards of a data set.
 
@@ -52,17 +62,30 @@ def generate_data_set(
             remove_leftovers(out)
 
 
-def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Callable[[str], None]) -> None:
+def _generate(
+    out: Path, plan: Plan, workers: int | None, engine: str, tell: Callable[[str], None]
+) -> None:
     checksums: dict[int, str] = {}
     if (out / MANIFEST).exists():
         recorded = read_manifest(out)["shards"]
-        checksums = {shard: found for shard, found in finished_shards(out, plan) if not recorded or recorded[shard_file(shard)] == found}
-        tell(f"{len(checksums):,} of {plan.num_shards:,} shards are there and intact; {plan.num_shards - len(checksums):,} to generate")
+        checksums = {
+            shard: found
+            for shard, found in finished_shards(out, plan)
+            if not recorded or recorded[shard_file(shard)] == found
+        }
+        tell(
+            f"{len(checksums):,} of {plan.num_shards:,} shards are there and intact; {plan.num_shards - len(checksums):,} to generate"
+        )
     else:
         write_manifest(out, plan)
-    done, generated = sum(map(plan.num_windows_in, checksums)), Progress(tell).loop("window", plan.num_windows)
+    done, generated = (
+        sum(map(plan.num_windows_in, checksums)),
+        Progress(tell).loop("window", plan.num_windows),
+    )
     missing = (shard for shard in range(plan.num_shards) if shard not in checksums)
-    running = engines.run(engine, ShardMaker(plan, out), missing, workers)  # starts no worker if no shard is missing
+    running = engines.run(
+        engine, ShardMaker(plan, out), missing, workers
+    )  # starts no worker if no shard is missing
     with contextlib.closing(running):
         for shard, checksum in running:
             if not (out / shard_file(shard)).is_file():
@@ -80,12 +103,18 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
 def locked(folder: Path) -> Iterator[None]:
     """Creates a folder and locks it against other runs. The operating system releases the lock when this process ends for any reason."""
     folder.mkdir(parents=True, exist_ok=True)
-    open(folder / _LOCK, "ab").close()  # no probe beside it: another run may be looking at what is there
-    lock = filelock.FileLock(folder / _LOCK, blocking=False, preserve_lock_file=True)  # or where there are no locks, a mark that stays
+    open(
+        folder / _LOCK, "ab"
+    ).close()  # no probe beside it: another run may be looking at what is there
+    lock = filelock.FileLock(
+        folder / _LOCK, blocking=False, preserve_lock_file=True
+    )  # or where there are no locks, a mark that stays
     try:
         lock.acquire()
     except filelock.Timeout:
-        raise InputError(f"Expected a folder that no other run writes to. Received: {folder}. Wait for it, or name another.") from None
+        raise InputError(
+            f"Expected a folder that no other run writes to. Received: {folder}. Wait for it, or name another."
+        ) from None
     try:
         yield
     finally:
@@ -96,7 +125,11 @@ def check_folder(folder: Path, plan: Plan) -> None:
     """Checks, without changing it, that a folder is new, empty, or contains a finished or unfinished data set of the same plan."""
     if not folder.is_dir():
         return
-    others = sorted(path.name for path in folder.iterdir() if path.name != _LOCK and not path.name.startswith(f".{MANIFEST}."))
+    others = sorted(
+        path.name
+        for path in folder.iterdir()
+        if path.name != _LOCK and not path.name.startswith(f".{MANIFEST}.")
+    )
     if MANIFEST not in others:
         if others:
             raise InputError(
@@ -107,21 +140,29 @@ def check_folder(folder: Path, plan: Plan) -> None:
     for name, asked in plan.settings().items():
         if kept.get(name) != asked:
             was, now = (json.dumps(each)[:100] for each in (kept.get(name), asked))
-            raise InputError(f"Expected {name} as in the data set in {folder}: {was}. Received: {now}. Give another --out.")
+            raise InputError(
+                f"Expected {name} as in the data set in {folder}: {was}. Received: {now}. Give another --out."
+            )
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Reads and validates the manifest of a data set. Its `shards` are the checksums by the names of the files, None if it is not finished."""
     if not os.path.isfile(folder / MANIFEST):
-        raise InputError(f"Expected a data set of `generate --workers`. Received: {folder}, which has no {MANIFEST}. Give another folder.")
+        raise InputError(
+            f"Expected a data set of `generate --workers`. Received: {folder}, which has no {MANIFEST}. Give another folder."
+        )
     try:
         content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
         settings, shards = content["settings"], content["shards"]
         if content["format"] != FORMAT or not min(settings["windows"], settings["shard"]) >= 1:
             raise ValueError(f"format or settings of something else: {str(content['format'])[:80]}")
         names = map(shard_file, range(num_shards(settings)))
-        if shards is not None and (len(shards) != num_shards(settings) or list(dict(shards)) != list(names)):
-            raise ValueError(f"{len(shards):,} other shards than the {num_shards(settings):,} of its settings")
+        if shards is not None and (
+            len(shards) != num_shards(settings) or list(dict(shards)) != list(names)
+        ):
+            raise ValueError(
+                f"{len(shards):,} other shards than the {num_shards(settings):,} of its settings"
+            )
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"Expected a data set of `generate` of the format {FORMAT}. Received: {folder}, whose {MANIFEST} is damaged or another one "
@@ -137,7 +178,11 @@ def num_shards(settings: Mapping[str, int]) -> int:
 
 def write_manifest(folder: Path, plan: Plan, checksums: Mapping[int, str] | None = None) -> None:
     """Writes the manifest of a data set, finished if the checksums of all its shards are given, by the number of the shard."""
-    shards = None if checksums is None else {shard_file(shard): checksums[shard] for shard in range(plan.num_shards)}
+    shards = (
+        None
+        if checksums is None
+        else {shard_file(shard): checksums[shard] for shard in range(plan.num_shards)}
+    )
     write_json(folder / MANIFEST, {"format": FORMAT, "settings": plan.settings(), "shards": shards})
 
 
@@ -145,7 +190,10 @@ def find_problems(folder: str | os.PathLike) -> Iterator[str]:
     """Verifies a data set and yields a line for each problem; raises InputError if there is no manifest, or a damaged one."""
     folder = Path(folder)
     manifest = read_manifest(folder)
-    shards, there = manifest["shards"], {path.name for path in folder.iterdir() if _SHARD.fullmatch(path.name) and path.is_file()}
+    shards, there = (
+        manifest["shards"],
+        {path.name for path in folder.iterdir() if _SHARD.fullmatch(path.name) and path.is_file()},
+    )
     if shards is None:
         yield f"not finished: {len(there):,} of {num_shards(manifest['settings']):,} shards are there; run the same `generate` again"
         return

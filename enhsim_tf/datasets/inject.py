@@ -14,7 +14,13 @@ import pandas as pd
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import series_table
-from enhsim_tf.datasets.places import WITHOUT_SEVERITY, InjectOptions, checked_place, draw_between, length_limits
+from enhsim_tf.datasets.places import (
+    WITHOUT_SEVERITY,
+    InjectOptions,
+    checked_place,
+    draw_between,
+    length_limits,
+)
 from enhsim_tf.detection.anomalies import INJECTIONS, estimate_noise_sd
 from enhsim_tf.simulator.joint import join_channels, telemetry_of
 from enhsim_tf.telemetry.pandas_series import index_of
@@ -42,9 +48,13 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
         (telemetry,) = join_channels({telemetry[0].name: telemetry})
     kinds, names, interval_s = options.kinds, telemetry.columns, telemetry.interval_s
     if options.is_joint and len(names) < 2:
-        raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
+        raise InputError(
+            f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns."
+        )
     nominal, index = telemetry.values.astype(np.float32), index_of(telemetry_of(telemetry))
-    series = [[part.values[:, channel] for part in telemetry.parts] for channel in range(len(names))]
+    series = [
+        [part.values[:, channel] for part in telemetry.parts] for channel in range(len(names))
+    ]
     noise_sd = np.array([options.noise_sd or estimate_noise_sd(parts) for parts in series])
     noisy = np.flatnonzero(noise_sd > 0)
     if not len(noisy) and (options.at or set(kinds) & set(INJECTIONS)):
@@ -55,7 +65,11 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
     rng = np.random.default_rng([options.seed, *([61] if len(names) > 1 else names[0].encode())])
     shortest, longest = length_limits(options.length, interval_s)
     drawn = [
-        (kind, 1.0 if kind in WITHOUT_SEVERITY else draw_between(options.severity, rng), int(rng.integers(shortest, longest + 1)))
+        (
+            kind,
+            1.0 if kind in WITHOUT_SEVERITY else draw_between(options.severity, rng),
+            int(rng.integers(shortest, longest + 1)),
+        )
         for kind in itertools.islice(itertools.cycle(kinds), options.number or len(kinds))
     ]
     given = []
@@ -73,9 +87,13 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
             if event.kind == "common_shift":
                 values[here] = nominal[here] + (event.severity * noise_sd).astype(np.float32)
             else:
-                values[here, channel] = _changed(nominal, event, channel, event.severity * noise_sd[channel], bounds, rng)
+                values[here, channel] = _changed(
+                    nominal, event, channel, event.severity * noise_sd[channel], bounds, rng
+                )
         if not np.isfinite(values[here]).all():
-            raise InputError(f"Expected anomalies within the range of float32. Received: {event}. Choose a lower severity.")
+            raise InputError(
+                f"Expected anomalies within the range of float32. Received: {event}. Choose a lower severity."
+            )
         places = np.flatnonzero((values[here] != nominal[here]).any(axis=1))
         if len(places):
             begin, length = event.begin + int(places[0]), int(places[-1] - places[0]) + 1
@@ -89,30 +107,51 @@ def inject(telemetry: Recording | Sequence[Telemetry], options: InjectOptions) -
                 f"Expected an anomaly that changes the telemetry. Received: {event}, which changes no sample. "
                 "Choose another place, a longer one or a higher severity."
             )
-    place_events(given, drawn, bounds, max([length for *_, length in drawn], default=0), changes, rng)
+    place_events(
+        given, drawn, bounds, max([length for *_, length in drawn], default=0), changes, rng
+    )
     found.sort(key=lambda each: each.begin)
-    frame = series_table(values, values != nominal, names, [(each.kind, each.severity, each.begin, each.end) for each in found], index)
-    frame.attrs.update(noise_sd=noise_sd.squeeze().tolist(), anomalies=found, counts=telemetry.clock().counts)
+    frame = series_table(
+        values,
+        values != nominal,
+        names,
+        [(each.kind, each.severity, each.begin, each.end) for each in found],
+        index,
+    )
+    frame.attrs.update(
+        noise_sd=noise_sd.squeeze().tolist(), anomalies=found, counts=telemetry.clock().counts
+    )
     return frame
 
 
 def _changed(
-    nominal: np.ndarray, event: PlacedEvent, channel: int, size: float, bounds: Sequence[tuple[int, int]], rng: np.random.Generator
+    nominal: np.ndarray,
+    event: PlacedEvent,
+    channel: int,
+    size: float,
+    bounds: Sequence[tuple[int, int]],
+    rng: np.random.Generator,
 ) -> np.ndarray:
     """Returns what a channel becomes during an anomaly of one channel."""
     here, length = slice(event.begin, event.end), event.length
     start, stop = next(each for each in bounds if each[0] <= event.begin < each[1])
     if event.kind in INJECTIONS:
         centre = nominal[None, start:stop, channel].mean(axis=1, dtype=np.float64, keepdims=True)
-        return INJECTIONS[event.kind](nominal[None, here, channel].astype(np.float64), size, centre, rng)[0]
+        return INJECTIONS[event.kind](
+            nominal[None, here, channel].astype(np.float64), size, centre, rng
+        )[0]
     if event.kind == "delay":
-        return nominal[np.maximum(np.arange(event.begin, event.end) - max(1, length // 4), start), channel]
+        return nominal[
+            np.maximum(np.arange(event.begin, event.end) - max(1, length // 4), start), channel
+        ]
     first = draw_begin(bounds, [(event.begin, event.end)], length, 0, rng)
     away = slice(first, first + length)
     if event.kind == "another_time":
         return nominal[away, channel]
     others = np.delete(nominal, channel, axis=1).astype(np.float64)
     centred = others - others.mean(axis=0)
-    weights, *_ = np.linalg.lstsq(centred, nominal[:, channel] - nominal[:, channel].mean(dtype=np.float64), rcond=None)
+    weights, *_ = np.linalg.lstsq(
+        centred, nominal[:, channel] - nominal[:, channel].mean(dtype=np.float64), rcond=None
+    )
     follows = centred @ weights
     return nominal[here, channel] - follows[here] + follows[away]

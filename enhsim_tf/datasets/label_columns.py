@@ -29,7 +29,11 @@ _TIMEEVAL = ("timestamp", "is_anomaly")  # the first and the last column of Time
 
 
 def series_table(
-    values: np.ndarray, masks: np.ndarray, channels: Sequence[str], events: Sequence[tuple[str, float, int, int]], index: pd.Index
+    values: np.ndarray,
+    masks: np.ndarray,
+    channels: Sequence[str],
+    events: Sequence[tuple[str, float, int, int]],
+    index: pd.Index,
 ) -> pd.DataFrame:
     """Makes the labelled table of a series. A sample that was not changed is labelled nominal, also within an event.
 
@@ -38,10 +42,17 @@ def series_table(
     """
     mask, is_joint = masks.any(axis=1), len(channels) > 1
     names = list(dict.fromkeys([NOMINAL, *(name for name, *_ in events)]))
-    codes, severity, onset, end = (np.zeros(len(mask), dtype) for dtype in (np.int8, np.float32, np.int32, np.int32))
+    codes, severity, onset, end = (
+        np.zeros(len(mask), dtype) for dtype in (np.int8, np.float32, np.int32, np.int32)
+    )
     for name, degree, first, last in events:
         inside = slice(first, last)
-        codes[inside], severity[inside], onset[inside], end[inside] = names.index(name), degree, first, last
+        codes[inside], severity[inside], onset[inside], end[inside] = (
+            names.index(name),
+            degree,
+            first,
+            last,
+        )
     codes[~mask], severity[~mask] = 0, 0
     columns = {
         **dict(zip(channels if is_joint else ["value"], values.T, strict=True)),
@@ -56,7 +67,11 @@ def series_table(
 
 
 def window_table(
-    windows: np.ndarray, masks: np.ndarray, channels: Sequence[str], names: Sequence[str], severities: Sequence[float]
+    windows: np.ndarray,
+    masks: np.ndarray,
+    channels: Sequence[str],
+    names: Sequence[str],
+    severities: Sequence[float],
 ) -> pa.Table:
     """Makes the labelled table of windows. A window in which no sample was changed is labelled nominal, with the severity 0.
 
@@ -65,11 +80,20 @@ def window_table(
     """
 
     def lists(values: np.ndarray) -> pa.Array:
-        return pa.FixedSizeListArray.from_arrays(pa.array(np.ascontiguousarray(values).ravel()), values.shape[1])
+        return pa.FixedSizeListArray.from_arrays(
+            pa.array(np.ascontiguousarray(values).ravel()), values.shape[1]
+        )
 
     mask, samples, is_joint = masks.any(axis=2), windows.shape[1], len(channels) > 1
-    changed, onset, end = mask.any(axis=1), mask.argmax(axis=1), samples - mask[:, ::-1].argmax(axis=1)
-    columns = {f"window {name}" if is_joint else "window": lists(windows[:, :, number]) for number, name in enumerate(channels)}
+    changed, onset, end = (
+        mask.any(axis=1),
+        mask.argmax(axis=1),
+        samples - mask[:, ::-1].argmax(axis=1),
+    )
+    columns = {
+        f"window {name}" if is_joint else "window": lists(windows[:, :, number])
+        for number, name in enumerate(channels)
+    }
     columns |= {
         "scenario": pa.array(np.where(changed, np.asarray(names, object), NOMINAL), pa.string()),
         "severity": pa.array(np.where(changed, severities, 0).astype(np.float32)),
@@ -77,7 +101,14 @@ def window_table(
         "end": pa.array(end.astype(np.int32), mask=~changed),
         "mask": lists(mask),
     }
-    return pa.table(columns | {f"mask {name}": lists(masks[:, :, number]) for number, name in enumerate(channels) if is_joint})
+    return pa.table(
+        columns
+        | {
+            f"mask {name}": lists(masks[:, :, number])
+            for number, name in enumerate(channels)
+            if is_joint
+        }
+    )
 
 
 def write_table(path: str | os.PathLike, frame: pd.DataFrame, timeeval: Sequence[str] = ()) -> None:
@@ -97,10 +128,20 @@ def write_table(path: str | os.PathLike, frame: pd.DataFrame, timeeval: Sequence
     if timeeval:
         taken = [name for name in timeeval if name in _TIMEEVAL]
         if taken:
-            raise InputError(f"Expected channels that are not named {' or '.join(_TIMEEVAL)}. Received: {taken[0]!r}. Rename it.")
-        times = frame.index.tz_convert(None) if isinstance(frame.index, pd.DatetimeIndex) else frame.index
-        values = {name: frame["value" if len(timeeval) == 1 else name].to_numpy() for name in timeeval}
-        table = pd.DataFrame({"timestamp": times, **values, "is_anomaly": frame["mask"].to_numpy().astype(np.int8)})
+            raise InputError(
+                f"Expected channels that are not named {' or '.join(_TIMEEVAL)}. Received: {taken[0]!r}. Rename it."
+            )
+        times = (
+            frame.index.tz_convert(None)
+            if isinstance(frame.index, pd.DatetimeIndex)
+            else frame.index
+        )
+        values = {
+            name: frame["value" if len(timeeval) == 1 else name].to_numpy() for name in timeeval
+        }
+        table = pd.DataFrame(
+            {"timestamp": times, **values, "is_anomaly": frame["mask"].to_numpy().astype(np.int8)}
+        )
     make_folder(Path(path).parent)
     with replace_file(path) as temporary:
         if Path(path).suffix == ".csv":

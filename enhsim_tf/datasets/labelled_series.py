@@ -13,12 +13,17 @@ from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.placing import PlacedEvent, in_order, place_events
 
 
-def series_index(num_samples: int, interval_s: float, start: str | pd.Timestamp | None = None) -> pd.Index:
+def series_index(
+    num_samples: int, interval_s: float, start: str | pd.Timestamp | None = None
+) -> pd.Index:
     """Returns the index of a generated series: times in UTC named `time`, or, without a start, seconds from 0 named `time_s`."""
     seconds = np.arange(num_samples) * interval_s
     if start is None:
         return pd.Index(seconds, name="time_s")
-    return pd.DatetimeIndex(parse_start(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"), name="time")
+    return pd.DatetimeIndex(
+        parse_start(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"),
+        name="time",
+    )
 
 
 def series_labelled(
@@ -50,7 +55,9 @@ def series_labelled(
             are given.
     """
     index = series_index(num_samples, simulator.interval_s, start)
-    values, masks, events = simulator.generate_labelled_series(num_samples, scenario, seed, schedule=schedule)
+    values, masks, events = simulator.generate_labelled_series(
+        num_samples, scenario, seed, schedule=schedule
+    )
     return series_table(values, masks, simulator.channels, events, index)
 
 
@@ -72,12 +79,21 @@ def draw_schedule(
         simulator.alignment.draw(np.zeros(0, int), [*modes, *given], rng)  # refuses them
     given = in_order(given, [(0, num_samples)], gap=1)
     gap = max(2 * fade_length(simulator.window) + 1, lengths[1])  # changes that fade do not meet
-    turns = [(modes[each % len(modes)], int(rng.integers(lengths[0], lengths[1] + 1))) for each in range(number)]
+    turns = [
+        (modes[each % len(modes)], int(rng.integers(lengths[0], lengths[1] + 1)))
+        for each in range(number)
+    ]
     drawn = [(mode.mode, draw_between(mode.severity, rng), length) for mode, length in turns]
 
     def changes(event: PlacedEvent) -> bool:
-        times, scenario = simulator.interval_s * np.arange(event.begin, event.end)[None], Degraded(event.kind, event.severity, 0.0)
+        times, scenario = (
+            simulator.interval_s * np.arange(event.begin, event.end)[None],
+            Degraded(event.kind, event.severity, 0.0),
+        )
         waves = simulator.alignment.simulators
-        return any((each.simulate(times, scenario, np.random.default_rng(0)) != each.simulate(times)).any() for each in waves)
+        return any(
+            (each.simulate(times, scenario, np.random.default_rng(0)) != each.simulate(times)).any()
+            for each in waves
+        )
 
     return place_events(given, drawn, [(0, num_samples)], gap, changes, rng)

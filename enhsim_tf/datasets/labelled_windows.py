@@ -53,7 +53,9 @@ class Plan:
 
     def __post_init__(self):
         if not 1 <= self.num_windows <= MOST_WINDOWS:
-            raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: --windows {self.num_windows}.")
+            raise InputError(
+                f"Expected 1 to {MOST_WINDOWS:,} windows. Received: --windows {self.num_windows}."
+            )
         if self.nominal_share < 1 and round(self.num_windows * self.shares[-1], 6) < 1:
             raise InputError(
                 f"Expected at least one window for each of {counted(len(self.scenarios), 'scenario')}. Received: {counted(self.num_windows, 'window')}, of which a "
@@ -63,7 +65,10 @@ class Plan:
     @property
     def shares(self) -> list[float]:
         """Shares of the nominal windows and of those of each scenario."""
-        return [self.nominal_share, *[(1 - self.nominal_share) / len(self.scenarios) for _ in self.scenarios]]
+        return [
+            self.nominal_share,
+            *[(1 - self.nominal_share) / len(self.scenarios) for _ in self.scenarios],
+        ]
 
     @property
     def num_shards(self) -> int:
@@ -108,7 +113,9 @@ def make_plan(
     """Makes the plan of labelled windows of a simulator that is saved in a folder. Without scenarios, all of them are nominal."""
     folder = Path(folder).absolute()
     rng = np.random.default_rng(0)
-    simulator.alignment.draw(np.zeros(len(scenarios), int), [each.draw(rng) for each in scenarios], rng)  # refuses what it cannot apply
+    simulator.alignment.draw(
+        np.zeros(len(scenarios), int), [each.draw(rng) for each in scenarios], rng
+    )  # refuses what it cannot apply
     window, channels = simulator.window, simulator.channels
     return Plan(
         tuple(scenarios),
@@ -140,10 +147,17 @@ def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator)
     """Assigns rows to categories in random order by systematic sampling: each category gets its share, rounded up or down."""
     edges = np.cumsum(shares) / np.sum(shares)
     points = (rng.random() + np.arange(num_rows)) / num_rows
-    return rng.permutation(np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1]))
+    return rng.permutation(
+        np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1])
+    )
 
 
-def write_windows(path: str | os.PathLike, plan: Plan, simulator: EnhancedSimulator, shards: Iterable[int] | None = None) -> None:
+def write_windows(
+    path: str | os.PathLike,
+    plan: Plan,
+    simulator: EnhancedSimulator,
+    shards: Iterable[int] | None = None,
+) -> None:
     """Writes the windows of some shards to one Parquet file, chunk by chunk. The file appears only when it is complete.
 
     A window that its scenario has not changed, such as one in which the mechanism would have stood still anyway, is labelled nominal.
@@ -154,19 +168,40 @@ def write_windows(path: str | os.PathLike, plan: Plan, simulator: EnhancedSimula
         simulator: The model of the plan.
         shards: Numbers of the shards. None: all of them, one after the other.
     """
-    about = {"format": FORMAT, _KEY: plan_key(plan.settings()), "interval_s": repr(plan.interval_s), "channel": ", ".join(plan.channels)}
+    about = {
+        "format": FORMAT,
+        _KEY: plan_key(plan.settings()),
+        "interval_s": repr(plan.interval_s),
+        "channel": ", ".join(plan.channels),
+    }
     none = np.zeros((0, plan.window, len(plan.channels)), np.float32)
     schema = window_table(none, none > 0, plan.channels, [], []).schema.with_metadata(about)
     # bytes of equal significance are stored together: signs and exponents compress well, noisy mantissas do not
-    encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in schema.names if name.startswith("window")}
-    options = {"compression": "zstd", "use_dictionary": ["scenario"], "column_encoding": encoding, "write_statistics": ["scenario"]}
+    encoding = {
+        f"{name}.list.element": "BYTE_STREAM_SPLIT"
+        for name in schema.names
+        if name.startswith("window")
+    }
+    options = {
+        "compression": "zstd",
+        "use_dictionary": ["scenario"],
+        "column_encoding": encoding,
+        "write_statistics": ["scenario"],
+    }
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
         for shard in range(plan.num_shards) if shards is None else shards:
-            (seed,) = np.random.SeedSequence([_STREAM, plan.seed, shard, 1]).generate_state(1, np.uint64).tolist()
+            (seed,) = (
+                np.random.SeedSequence([_STREAM, plan.seed, shard, 1])
+                .generate_state(1, np.uint64)
+                .tolist()
+            )
             scenarios, first = draw_scenarios(plan, shard), 0
             for windows, masks in simulator.generate_labelled_chunks(scenarios, seed):
                 some, first = scenarios[first : first + len(windows)], first + len(windows)
-                names, severities = zip(*((each.mode, each.severity) if each else (NOMINAL, 0.0) for each in some), strict=True)
+                names, severities = zip(
+                    *((each.mode, each.severity) if each else (NOMINAL, 0.0) for each in some),
+                    strict=True,
+                )
                 writer.write_table(window_table(windows, masks, plan.channels, names, severities))
 
 
@@ -177,7 +212,9 @@ def finished_shards(folder: Path, plan: Plan) -> Iterator[tuple[int, str]]:
         path = folder / shard_file(shard)
         with contextlib.suppress(OSError, pa.ArrowException):  # no file, or one that is damaged
             file = pq.read_metadata(path)
-            if (file.metadata or {}).get(_KEY) == key and file.num_rows == plan.num_windows_in(shard):
+            if (file.metadata or {}).get(_KEY) == key and file.num_rows == plan.num_windows_in(
+                shard
+            ):
                 yield shard, sha256(path)
 
 
@@ -186,19 +223,25 @@ class ShardMaker:
 
     def __init__(self, plan: Plan, folder: str | os.PathLike):
         self.plan, self.folder = plan, Path(folder).absolute()
-        self.settings = plan.settings()  # computed on the main machine; workers on other machines must agree
+        self.settings = (
+            plan.settings()
+        )  # computed on the main machine; workers on other machines must agree
 
     @functools.cached_property
     def simulator(self) -> EnhancedSimulator:
         """The loaded model of the plan, if it is still the same, and the libraries of this machine too."""
         if self.plan.settings() != self.settings:
-            versions = ", ".join(f"{name} {version}" for name, version in self.settings["versions"].items())
+            versions = ", ".join(
+                f"{name} {version}" for name, version in self.settings["versions"].items()
+            )
             raise InputError(
                 f"Expected every machine to have {versions}. Received: other versions on {os.uname().nodename}. Install these."
             )
         simulator = EnhancedSimulator.load(self.plan.folder)
         if sha256(self.plan.folder / MANIFEST) != self.plan.sha256:
-            raise InputError(f"Expected the same model as at the start of the data set. Received: another model in {self.plan.folder}.")
+            raise InputError(
+                f"Expected the same model as at the start of the data set. Received: another model in {self.plan.folder}."
+            )
         return simulator
 
     def __call__(self, shard: int) -> tuple[int, str]:

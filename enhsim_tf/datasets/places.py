@@ -27,7 +27,9 @@ _LENGTH = re.compile(
     r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?"
 )  # decimals need a unit, because a number of samples is a whole number
 _MOST_SAMPLES = 20_000_000  # of a series, which is held in memory
-_degraded = functools.lru_cache(128)(Degraded)  # thousands of windows of one scenario without a range share one object
+_degraded = functools.lru_cache(128)(
+    Degraded
+)  # thousands of windows of one scenario without a range share one object
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +55,9 @@ class ScenarioRange:
         for severity, onset in zip(self.severity, self.onset, strict=True):
             Degraded(self.mode, severity, onset)  # checks all three
         if self.severity[0] > self.severity[1] or self.onset[0] > self.onset[1]:
-            raise InputError(f"Expected ranges with the lower number first. Received: {self.severity} and {self.onset}.")
+            raise InputError(
+                f"Expected ranges with the lower number first. Received: {self.severity} and {self.onset}."
+            )
 
     def __str__(self) -> str:
         """The mode and its severity, such as `stuck at 0.2-0.8`."""
@@ -61,7 +65,9 @@ class ScenarioRange:
 
     def draw(self, rng: np.random.Generator) -> Degraded:
         """Draws the scenario of a window or event."""
-        return _degraded(self.mode, draw_between(self.severity, rng), draw_between(self.onset, rng), self.channel)
+        return _degraded(
+            self.mode, draw_between(self.severity, rng), draw_between(self.onset, rng), self.channel
+        )
 
 
 def parse_scenario(text: str) -> ScenarioRange:
@@ -69,7 +75,9 @@ def parse_scenario(text: str) -> ScenarioRange:
     channel, is_named, rest = text.rpartition("=")
     mode, *numbers = rest.split(":")
     try:
-        severity, onset = map(_limits, numbers if len(numbers) == 2 else [*numbers, str(Degraded.onset)])
+        severity, onset = map(
+            _limits, numbers if len(numbers) == 2 else [*numbers, str(Degraded.onset)]
+        )
         return ScenarioRange(mode, severity, onset, channel if is_named else None)
     except ValueError:
         raise InputError(
@@ -79,7 +87,9 @@ def parse_scenario(text: str) -> ScenarioRange:
 
 
 def _limits(text: str) -> tuple[float, float]:
-    numbers = [float(number) for number in re.split(r"(?<=[\d.])-", text, maxsplit=1)]  # the hyphen of 1e-3 follows a letter
+    numbers = [
+        float(number) for number in re.split(r"(?<=[\d.])-", text, maxsplit=1)
+    ]  # the hyphen of 1e-3 follows a letter
     return numbers[0], numbers[-1]
 
 
@@ -92,7 +102,9 @@ def parse_length(text: str) -> tuple[float, str]:
     found = _LENGTH.fullmatch(text.casefold())
     length = float(found["number"]) if found else 0.0
     if not 0 < length < float("inf"):
-        raise InputError(f"Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: {text[:80]!r}.")
+        raise InputError(
+            f"Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: {text[:80]!r}."
+        )
     return (length * _SECONDS[found["unit"]], "s") if found["unit"] else (length, "samples")
 
 
@@ -117,7 +129,9 @@ def parse_start(start: "str | pd.Timestamp") -> "pd.Timestamp":
     except (ValueError, TypeError, OverflowError, AttributeError):
         time = pd.NaT
     if pd.isna(time) or not 1700 <= time.year <= 2200:
-        raise InputError(f"Expected a start such as 2024-01-01 or 2024-01-01T12:00, from 1700 to 2200. Received: {str(start)[:80]!r}.")
+        raise InputError(
+            f"Expected a start such as 2024-01-01 or 2024-01-01T12:00, from 1700 to 2200. Received: {str(start)[:80]!r}."
+        )
     return time
 
 
@@ -137,9 +151,15 @@ class Place:
             return int(self.begin[:12]), length
         time = parse_start(self.begin)
         if not hasattr(index, "tz"):
-            raise InputError(f"Expected a sample number as the place, since the series has no times. Received: {self.begin[:80]!r}.")
+            raise InputError(
+                f"Expected a sample number as the place, since the series has no times. Received: {self.begin[:80]!r}."
+            )
         first = int(index.searchsorted(time))
-        if time < index[0] or first == len(index) or (index[first] - time).total_seconds() > interval_s:
+        if (
+            time < index[0]
+            or first == len(index)
+            or (index[first] - time).total_seconds() > interval_s
+        ):
             raise InputError(
                 f"Expected a time from {index[0].isoformat()} to {index[-1].isoformat()}, not in a gap. Received: {self.begin[:80]!r}. "
                 "Choose another."
@@ -166,7 +186,9 @@ def length_limits(limits: Sequence[str], interval_s: float) -> tuple[int, int]:
     """Converts the least and the greatest length of events to samples, one every `interval_s` seconds."""
     shortest, longest = (parse_num_samples(text, interval_s) for text in limits)
     if shortest > longest:
-        raise InputError(f"Expected lengths with the least first. Received: {limits[0]}:{limits[1]}.")
+        raise InputError(
+            f"Expected lengths with the least first. Received: {limits[0]}:{limits[1]}."
+        )
     return shortest, longest
 
 
@@ -174,7 +196,9 @@ def split_limits(name: str, text: str) -> tuple[str, str]:
     """Splits `least:greatest`, the value of the option `--name`; one value stands for both."""
     least, colon, greatest = text.partition(":")
     if not least or (colon and not greatest) or ":" in greatest:
-        raise InputError(f"Expected --{name} as one value, or as least:greatest. Received: --{name} {text}.")
+        raise InputError(
+            f"Expected --{name} as one value, or as least:greatest. Received: --{name} {text}."
+        )
     return least, greatest or least
 
 
@@ -221,13 +245,21 @@ class InjectOptions:
         for kind in self.kinds:
             check_kind(kind, low, (*INJECTIONS, *JOINT_KINDS))
         if not (0 <= low <= high and (high < np.inf or low == high)):
-            raise InputError(f"Expected severities from 0 on, the least first. Received: {low:g}:{high:g}.")
+            raise InputError(
+                f"Expected severities from 0 on, the least first. Received: {low:g}:{high:g}."
+            )
         if not self.kinds and not self.at:
-            raise InputError("Expected kinds of anomaly or places. Received: neither. Give --kinds, such as all, or --at.")
+            raise InputError(
+                "Expected kinds of anomaly or places. Received: neither. Give --kinds, such as all, or --at."
+            )
         if self.number is not None and (not 1 <= self.number <= _MOST or not self.kinds):
-            raise InputError(f"Expected 1 to {_MOST:,} anomalies with drawn places, of given kinds. Received: number={self.number}.")
+            raise InputError(
+                f"Expected 1 to {_MOST:,} anomalies with drawn places, of given kinds. Received: number={self.number}."
+            )
         if self.noise_sd is not None and not 0 < self.noise_sd < np.inf:
-            raise InputError(f"Expected a standard deviation of the noise above 0. Received: noise_sd={self.noise_sd}.")
+            raise InputError(
+                f"Expected a standard deviation of the noise above 0. Received: noise_sd={self.noise_sd}."
+            )
         for text in self.length:
             parse_length(str(text))
         for text in self.at:

@@ -11,7 +11,13 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
-SEVERITIES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the experiments, in units of the standard deviation of the noise
+SEVERITIES = (
+    0.5,
+    1.0,
+    2.0,
+    4.0,
+    8.0,
+)  # of the experiments, in units of the standard deviation of the noise
 DURATIONS = (25, 100, 250)  # of the experiments, in samples
 SPIKE_INTERVAL = 25  # number of samples from one spike of an anomaly to the next
 OSCILLATION_PERIOD = 20  # in samples; shorter than the shortest duration, and much shorter than the periods of the telemetry
@@ -23,25 +29,33 @@ def _sides(pieces: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return rng.choice([-1.0, 1.0], (len(pieces), 1))
 
 
-def _spike(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _spike(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Shifts the first of every 25 samples by the severity. All shifts have the same, random sign."""
     changed = pieces.copy()
     changed[:, ::SPIKE_INTERVAL] += size * _sides(pieces, rng)
     return changed
 
 
-def _level_shift(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _level_shift(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Shifts all samples by the severity, with a random sign."""
     return pieces + size * _sides(pieces, rng)
 
 
-def _ramp(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _ramp(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Adds a linear ramp with a random sign, which reaches the severity at the last sample."""
     duration = pieces.shape[1]
     return pieces + size * _sides(pieces, rng) * np.arange(1, duration + 1) / duration
 
 
-def _stuck(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _stuck(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Simulates a stuck sensor: holds each value until the true one differs by more than the severity; if infinite, throughout."""
     changed = pieces.copy()
     for place in range(1, pieces.shape[1]):
@@ -50,29 +64,39 @@ def _stuck(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.G
     return changed
 
 
-def _variance_change(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _variance_change(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Adds white Gaussian noise, whose standard deviation is the severity."""
     return pieces + size * rng.standard_normal(pieces.shape)
 
 
-def _oscillation(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _oscillation(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Adds a sine with a period of 20 samples, whose amplitude is the severity. It starts at zero."""
     return pieces + size * np.sin(2 * np.pi * np.arange(pieces.shape[1]) / OSCILLATION_PERIOD)
 
 
-def _dropout(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _dropout(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Simulates the loss of a signal: a constant, below the first sample by the severity. A severity of 0 holds the first value."""
     return np.repeat(pieces[:, :1] - size, pieces.shape[1], axis=1)
 
 
-def _gain(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _gain(
+    pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Amplifies the deviations from the mean of the window, such that the root mean square of the change is the severity."""
     deviation = pieces - centre
     square = np.mean(deviation**2, axis=1, keepdims=True)
     return pieces + size * deviation / np.sqrt(np.where(square > 0, square, 1))
 
 
-INJECTIONS: dict[str, Callable[[np.ndarray, float, np.ndarray, np.random.Generator], np.ndarray]] = {
+INJECTIONS: dict[
+    str, Callable[[np.ndarray, float, np.ndarray, np.random.Generator], np.ndarray]
+] = {
     "spike": _spike,
     "level_shift": _level_shift,
     "ramp": _ramp,
@@ -88,13 +112,22 @@ INJECTIONS: dict[str, Callable[[np.ndarray, float, np.ndarray, np.random.Generat
 def check_kind(kind: str, severity: float, known: Collection[str] = INJECTIONS) -> None:
     """Raises InputError if a kind is unknown, or its severity is not a number of at least 0; only `stuck` may be infinite."""
     if kind not in known:
-        raise InputError(f"Expected a kind of anomaly, one of: {', '.join(known)}. Received: {kind!r}. Name one of these.")
+        raise InputError(
+            f"Expected a kind of anomaly, one of: {', '.join(known)}. Received: {kind!r}. Name one of these."
+        )
     if not severity >= 0 or (severity == np.inf and kind != "stuck"):
-        raise InputError(f"Expected a severity of 0 or more, which may be infinite only for stuck. Received: {kind} at {severity}.")
+        raise InputError(
+            f"Expected a severity of 0 or more, which may be infinite only for stuck. Received: {kind} at {severity}."
+        )
 
 
 def inject(
-    windows: np.ndarray, kind: str, severity: float, duration: int, noise_sd: float, rng: np.random.Generator
+    windows: np.ndarray,
+    kind: str,
+    severity: float,
+    duration: int,
+    noise_sd: float,
+    rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Injects one anomaly into each window, at a random position.
 
@@ -111,11 +144,15 @@ def inject(
     """
     check_kind(kind, severity)
     if not 1 <= duration <= windows.shape[1]:
-        raise InputError(f"Expected a duration of 1 to {windows.shape[1]} samples. Received: duration={duration}.")
+        raise InputError(
+            f"Expected a duration of 1 to {windows.shape[1]} samples. Received: duration={duration}."
+        )
     begins = rng.integers(0, windows.shape[1] - duration + 1, len(windows))
     rows, columns = np.arange(len(windows))[:, None], begins[:, None] + np.arange(duration)
     means = np.mean(windows, axis=1, dtype=np.float64, keepdims=True)
-    pieces = INJECTIONS[kind](np.asarray(windows[rows, columns], np.float64), severity * noise_sd, means, rng)
+    pieces = INJECTIONS[kind](
+        np.asarray(windows[rows, columns], np.float64), severity * noise_sd, means, rng
+    )
     anomalous, mask = np.array(windows, np.float32), np.zeros(windows.shape, bool)
     step = SPIKE_INTERVAL if kind == "spike" else 1  # the samples between spikes are nominal
     anomalous[rows, columns[:, ::step]], mask[rows, columns[:, ::step]] = pieces[:, ::step], True
@@ -130,7 +167,12 @@ def estimate_noise_sd(parts: Sequence[np.ndarray]) -> float:
     more than half of the differences are zero, as in telemetry with few levels, their root mean square is used instead; if all are, the
     result is 0. Noise that is correlated between neighbouring samples is underestimated.
     """
-    differences = np.concatenate([np.zeros(0), *(np.diff(np.asarray(part, np.float64), 2) for part in parts if len(part) > 2)])
+    differences = np.concatenate(
+        [
+            np.zeros(0),
+            *(np.diff(np.asarray(part, np.float64), 2) for part in parts if len(part) > 2),
+        ]
+    )
     if not len(differences):
         return 0.0
     robust = _NORMAL_MAD * np.median(np.abs(differences))

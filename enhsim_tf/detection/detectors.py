@@ -32,7 +32,9 @@ class LimitCheck:
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest distance outside the limits, in the unit of the telemetry; within them, minus the remaining margin."""
-        beyond = np.maximum(self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1])
+        beyond = np.maximum(
+            self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1]
+        )
         return beyond.reshape(len(windows), -1).max(axis=1)
 
 
@@ -47,15 +49,24 @@ class PCAResidual:
         from sklearn.decomposition import PCA
 
         windows = flat(windows)
-        with threadpool_limits(1), np.errstate(invalid="ignore"):  # the shares of variance of equal windows are not used
-            self._pca = PCA(min(self.num_components, *windows.shape), svd_solver="randomized", random_state=self.seed).fit(windows)
+        with (
+            threadpool_limits(1),
+            np.errstate(invalid="ignore"),
+        ):  # the shares of variance of equal windows are not used
+            self._pca = PCA(
+                min(self.num_components, *windows.shape),
+                svd_solver="randomized",
+                random_state=self.seed,
+            ).fit(windows)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the mean squared residual of each window."""
         windows = flat(windows)
         with threadpool_limits(1):
-            return np.mean((windows - self._pca.inverse_transform(self._pca.transform(windows))) ** 2, axis=1)
+            return np.mean(
+                (windows - self._pca.inverse_transform(self._pca.transform(windows))) ** 2, axis=1
+            )
 
 
 class JointMeans:
@@ -70,7 +81,10 @@ class JointMeans:
     def fit(self, windows: np.ndarray) -> "JointMeans":
         """Estimates mean and covariance from nominal windows."""
         means = self._means(windows)
-        self._mean, self._precision = means.mean(axis=0), np.linalg.pinv(np.atleast_2d(np.cov(means, rowvar=False)), hermitian=True)
+        self._mean, self._precision = (
+            means.mean(axis=0),
+            np.linalg.pinv(np.atleast_2d(np.cov(means, rowvar=False)), hermitian=True),
+        )
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -95,7 +109,12 @@ class JointSize:
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the larger distance of each window."""
-        return np.maximum(*(scale.score(windows) / unit for scale, unit in zip(self._scales, self._units, strict=True)))
+        return np.maximum(
+            *(
+                scale.score(windows) / unit
+                for scale, unit in zip(self._scales, self._units, strict=True)
+            )
+        )
 
 
 class _Control:
@@ -111,7 +130,11 @@ class LargestStep(_Control):
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest absolute first difference of each window, in the unit of the telemetry."""
-        return np.abs(np.diff(windows, axis=1)).reshape(len(windows), windows.shape[1] - 1, -1).max(axis=(1, 2))
+        return (
+            np.abs(np.diff(windows, axis=1))
+            .reshape(len(windows), windows.shape[1] - 1, -1)
+            .max(axis=(1, 2))
+        )
 
 
 class MovingDeviation(_Control):
@@ -119,7 +142,9 @@ class MovingDeviation(_Control):
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest moving standard deviation of each window, in the unit of the telemetry."""
-        centred = np.asarray(windows, np.float64) - np.mean(windows, axis=1, keepdims=True, dtype=np.float64)
+        centred = np.asarray(windows, np.float64) - np.mean(
+            windows, axis=1, keepdims=True, dtype=np.float64
+        )
         centred, width = centred.reshape(*windows.shape[:2], -1), min(_WIDTH, windows.shape[1])
         sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0), (0, 0))), axis=2)
         mean, square = (sums[:, :, width:] - sums[:, :, :-width]) / width
@@ -141,8 +166,12 @@ class Innovation:
         values = np.asarray(windows, np.float64)
         self._mean, order = values.mean(axis=(0, 1)), max(1, min(self.order, values.shape[1] // 4))
         number = max(1, _MOST_ROWS // (values.shape[1] - order))
-        centred = (values - self._mean)[np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)]
-        view = np.lib.stride_tricks.sliding_window_view(centred, order + 1, axis=1)  # (windows, places, channels, order + 1)
+        centred = (values - self._mean)[
+            np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)
+        ]
+        view = np.lib.stride_tricks.sliding_window_view(
+            centred, order + 1, axis=1
+        )  # (windows, places, channels, order + 1)
         past = view[..., :-1].reshape(-1, centred.shape[2] * order)
         now = view[..., -1].reshape(-1, centred.shape[2])
         gram = past.T @ past
@@ -150,7 +179,9 @@ class Innovation:
         self._weights = np.linalg.solve(gram, past.T @ now)
         errors = now - past @ self._weights
         covariance = errors.T @ errors / len(errors)
-        covariance[np.diag_indices_from(covariance)] += 1e-6 * np.trace(covariance) / len(covariance) + 1e-24
+        covariance[np.diag_indices_from(covariance)] += (
+            1e-6 * np.trace(covariance) / len(covariance) + 1e-24
+        )
         self._whiten = np.linalg.cholesky(np.linalg.inv(covariance))
         return self
 
@@ -158,7 +189,9 @@ class Innovation:
         """Returns the mean square of the weighed errors of each window, about the number of channels for nominal ones."""
         values = np.asarray(windows, np.float64) - self._mean
         order, channels = len(self._weights) // values.shape[2], values.shape[2]
-        kernels = self._weights.reshape(channels, order, channels).astype(np.float32)  # input, lag from the oldest, output
+        kernels = self._weights.reshape(channels, order, channels).astype(
+            np.float32
+        )  # input, lag from the oldest, output
         scores = np.empty(len(values))
         step = max(1, 2_000_000 // (values.shape[1] * channels))
         for first in range(0, len(values), step):
@@ -166,7 +199,9 @@ class Innovation:
             errors = some[:, order:].copy()
             for lag in range(order):
                 errors -= some[:, lag : lag - order] @ kernels[:, lag]
-            scores[first : first + step] = np.mean(np.sum((errors @ self._whiten.astype(np.float32)) ** 2, axis=2), axis=1)
+            scores[first : first + step] = np.mean(
+                np.sum((errors @ self._whiten.astype(np.float32)) ** 2, axis=2), axis=1
+            )
         return scores
 
 

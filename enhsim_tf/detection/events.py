@@ -27,7 +27,10 @@ def events_of(flags: np.ndarray, scores: np.ndarray | None = None, gap: int = 0)
             joined[-1] = (joined[-1][0], end)
         else:
             joined.append((begin, end))
-    return [Event(begin, end, begin if scores is None else begin + int(np.argmax(scores[begin:end]))) for begin, end in joined]
+    return [
+        Event(begin, end, begin if scores is None else begin + int(np.argmax(scores[begin:end])))
+        for begin, end in joined
+    ]
 
 
 def confidences(peaks: Sequence[float], nominal_scores: np.ndarray, block: int) -> np.ndarray:
@@ -36,7 +39,9 @@ def confidences(peaks: Sequence[float], nominal_scores: np.ndarray, block: int) 
     The p-value is the share of blocks of nominal scores, each of `block` samples, whose highest score reaches that of the event, which is itself
     counted among the blocks. The confidence is therefore below 1, however high the score.
     """
-    highest = np.sort([part.max() for part in np.split(nominal_scores, range(block, len(nominal_scores), block))])
+    highest = np.sort(
+        [part.max() for part in np.split(nominal_scores, range(block, len(nominal_scores), block))]
+    )
     reached = len(highest) - np.searchsorted(highest, np.asarray(peaks, np.float64), side="left")
     return 1 - (1 + reached) / (1 + len(highest))
 
@@ -46,7 +51,9 @@ def false_alarms_per_day(num_events: int, duration_s: float) -> tuple[float, flo
 
     The events in nominal telemetry are joined as in operation, so that they are about independent of each other.
     """
-    from scipy.special import gammaincinv  # half of the quantiles of chi-squared; scipy.stats takes a second to import
+    from scipy.special import (
+        gammaincinv,
+    )  # half of the quantiles of chi-squared; scipy.stats takes a second to import
 
     tail, days = (1 - _LEVEL) / 2, duration_s / DAY_S
     low = gammaincinv(num_events, tail) if num_events else 0.0

@@ -26,12 +26,18 @@ def threshold(scores: np.ndarray, rate: float) -> float:
         InputError: If the rate is not between 0 and 1, or if there are no scores.
     """
     if not 0 < rate < 1 or len(scores) == 0:
-        raise InputError(f"Expected a rate between 0 and 1, and at least one score. Received: rate={rate} and {len(scores)} scores.")
-    rank = int(np.ceil((len(scores) + 1) * (1 - rate) - 1e-9))  # the rounding of 1 - rate must not increase the rank
+        raise InputError(
+            f"Expected a rate between 0 and 1, and at least one score. Received: rate={rate} and {len(scores)} scores."
+        )
+    rank = int(
+        np.ceil((len(scores) + 1) * (1 - rate) - 1e-9)
+    )  # the rounding of 1 - rate must not increase the rank
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
 
 
-def finite_threshold(scores: np.ndarray, rate: float, num_independent: int | None = None) -> tuple[float, float]:
+def finite_threshold(
+    scores: np.ndarray, rate: float, num_independent: int | None = None
+) -> tuple[float, float]:
     """Computes the conformal threshold, or the largest score if there are too few scores for the rate.
 
     With the largest of `n` scores as threshold, the expected false-alarm rate is at most `1 / (n + 1)`, which is returned.
@@ -45,7 +51,9 @@ def finite_threshold(scores: np.ndarray, rate: float, num_independent: int | Non
         The threshold and the false-alarm rate that it is set for, which is `rate` or larger.
     """
     conformal = threshold(scores, rate)
-    smallest = 1 / ((num_independent or len(scores)) + 1)  # the least rate with a finite conformal threshold
+    smallest = 1 / (
+        (num_independent or len(scores)) + 1
+    )  # the least rate with a finite conformal threshold
     return (float(np.max(scores)), smallest) if rate < smallest * (1 - 1e-9) else (conformal, rate)
 
 

@@ -15,7 +15,15 @@ import numpy as np
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
+from enhsim_tf.enhancer.names import (
+    BEST,
+    CANDIDATES,
+    COARSE,
+    LEVEL_AND_GAIN,
+    NETWORK,
+    RIDGE,
+    RIDGE_AND_FEATURES,
+)
 from enhsim_tf.enhancer.ridge import Ridge, fit_ridge
 from enhsim_tf.paper.settings import Settings
 
@@ -39,7 +47,9 @@ class Judged:
     @property
     def is_within(self) -> bool:
         """Whether the candidate is within one standard error of the best one, or behind by 1 % of its error at most."""
-        return self.behind <= max(self.behind_standard_error, _NEGLIGIBLE * (self.error**2 - self.behind))
+        return self.behind <= max(
+            self.behind_standard_error, _NEGLIGIBLE * (self.error**2 - self.behind)
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,8 +59,12 @@ class Choice:
     enhancer: Enhancer  # fitted to all windows
     judged: tuple[Judged, ...]  # the held-out error of each candidate that was tried
     edges: np.ndarray  # of the blocks of time; the blocks of fold 0 were held out
-    without_fold: Enhancer  # the chosen candidate as it was judged, fitted without the held-out blocks
-    penalties: tuple[float, ...]  # of ridge regression, one for each channel, chosen without the held-out blocks
+    without_fold: (
+        Enhancer  # the chosen candidate as it was judged, fitted without the held-out blocks
+    )
+    penalties: tuple[
+        float, ...
+    ]  # of ridge regression, one for each channel, chosen without the held-out blocks
 
 
 def choose_enhancer(
@@ -91,7 +105,14 @@ def choose_enhancer(
     for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
         progress.step(f"enhancer {name}")
         fitted[name] = learnt.fit(name, seed, epochs)
-        errors = np.mean((fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
+        errors = (
+            np.mean(
+                (fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2,
+                axis=1,
+                dtype=np.float64,
+            )
+            / variance
+        )
         squared[name] = np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
     judged, penalties = judge(squared), learnt.ridge.chosen
     chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
@@ -105,7 +126,9 @@ def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
     judged = []
     for name, errors in squared.items():
         error, apart = float(np.sqrt(np.mean(errors))), errors - squared[best]
-        spread = _standard_error(errors) / (2 * error) if error else 0.0  # the derivative of the root
+        spread = (
+            _standard_error(errors) / (2 * error) if error else 0.0
+        )  # the derivative of the root
         judged.append(Judged(name, error, spread, float(np.mean(apart)), _standard_error(apart)))
     return tuple(judged)
 
@@ -124,24 +147,38 @@ class Training:
         penalties: Penalty of each channel, as `Choice.penalties` of similar windows; None: chosen by blocks of time.
     """
 
-    def __init__(self, inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray, penalties: Sequence[float] | None = None):
+    def __init__(
+        self,
+        inputs: np.ndarray,
+        targets: np.ndarray,
+        starts: np.ndarray,
+        penalties: Sequence[float] | None = None,
+    ):
         self.inputs, self.targets, self.starts, self.penalties = inputs, targets, starts, penalties
-        self.centre, self.middle = (each.mean(axis=(0, 1), dtype=np.float64) for each in (inputs, targets))
+        self.centre, self.middle = (
+            each.mean(axis=(0, 1), dtype=np.float64) for each in (inputs, targets)
+        )
         self.scale, self.unit = (_deviations(each) for each in (inputs, targets))
         self.rows = ((inputs - self.centre) / self.scale).astype(np.float32)
-        self.outputs = ((targets - self.middle) / self.unit).astype(np.float32).reshape(len(targets), -1)
+        self.outputs = (
+            ((targets - self.middle) / self.unit).astype(np.float32).reshape(len(targets), -1)
+        )
 
     @functools.cached_property
     def ridge(self) -> Ridge:
         """Ridge regression in units of standard deviations."""
-        return fit_ridge(self.rows, self.outputs, self.starts, num_channels=len(self.unit), chosen=self.penalties)
+        return fit_ridge(
+            self.rows, self.outputs, self.starts, num_channels=len(self.unit), chosen=self.penalties
+        )
 
     def fit(self, name: str, seed: int = 0, epochs: int = 6) -> Enhancer:
         """Fits one of `CANDIDATES` to all windows, as in `choose_enhancer`; raises InputError if there is none, or the training diverges."""
         if name in (COARSE, LEVEL_AND_GAIN):
             return self._keeping_the_shape(name)
         if name not in CANDIDATES:
-            raise InputError(f"Expected an enhancer, one of: {', '.join(CANDIDATES)}. Received: {name!r}.")
+            raise InputError(
+                f"Expected an enhancer, one of: {', '.join(CANDIDATES)}. Received: {name!r}."
+            )
         window, flat = self.rows.shape[1], self.rows.reshape(len(self.rows), -1)
         column_scale, output_unit = np.tile(self.scale, window), np.tile(self.unit, window)
         linear, factors, layers = np.zeros(self.outputs.shape[1]), (), ()
@@ -154,17 +191,27 @@ class Training:
             maps[-1] = maps[-1] * output_unit
             factors = tuple(each.astype(np.float32) for each in maps)
         if name == RIDGE_AND_FEATURES:
-            layers = _random_features(flat, self.outputs - ridge.predict(self.rows), self.starts, len(self.unit), seed)
+            layers = _random_features(
+                flat, self.outputs - ridge.predict(self.rows), self.starts, len(self.unit), seed
+            )
         if layers:
             (kernel, bias), (*between, (last, last_bias)) = layers[0], layers[1:]
-            layers = ((kernel / column_scale[:, None], bias), *between, (last * output_unit, last_bias * output_unit))
-            layers = tuple((kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers)
+            layers = (
+                (kernel / column_scale[:, None], bias),
+                *between,
+                (last * output_unit, last_bias * output_unit),
+            )
+            layers = tuple(
+                (kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers
+            )
             if not all(np.isfinite(each).all() for layer in layers for each in layer):
                 raise InputError(
                     "Expected telemetry from which the enhancer can learn. Received: a training that diverged. "
                     "Look for values far from all others, or use --enhancer ridge."
                 )
-        return self._enhancer(name, np.tile(self.middle, window) + output_unit * linear, factors, layers)
+        return self._enhancer(
+            name, np.tile(self.middle, window) + output_unit * linear, factors, layers
+        )
 
     def _keeping_the_shape(self, name: str) -> Enhancer:
         """Fits the two simplest candidates: the most similar coarse column of each channel, unchanged or with a level and a gain."""
@@ -181,16 +228,22 @@ class Training:
 
     def _enhancer(self, name: str, bias: np.ndarray, *parts: Any, **others: Any) -> Enhancer:
         sizes = *self.inputs.shape[1:], self.targets.shape[2]
-        return Enhancer(name, *sizes, self.centre.astype(np.float32), bias.astype(np.float32), *parts, **others)
+        return Enhancer(
+            name, *sizes, self.centre.astype(np.float32), bias.astype(np.float32), *parts, **others
+        )
 
 
-def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def _train(
+    rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Trains the paper's network, whose learning rate falls to zero here; returns kernel and bias of each Dense layer."""
     from enhsim_tf.common.backend import keras
     from enhsim_tf.paper.enhancer import build_enhancer, train_enhancer
 
     settings = Settings(seed=seed, epochs=epochs, window=wanted.shape[1])
-    falling = keras.optimizers.schedules.CosineDecay(settings.learning_rate, epochs * -(-len(rows) // settings.batch_size))
+    falling = keras.optimizers.schedules.CosineDecay(
+        settings.learning_rate, epochs * -(-len(rows) // settings.batch_size)
+    )
     network = build_enhancer(settings, num_inputs=rows.shape[1])
     train_enhancer(network, rows, wanted, dataclasses.replace(settings, learning_rate=falling))
     return [tuple(layer.get_weights()) for layer in network.layers]
@@ -203,7 +256,9 @@ def _random_features(
     rng = np.random.default_rng([seed, 11])
     kernel = rng.standard_normal((rows.shape[1], _NUM_FEATURES)) / np.sqrt(rows.shape[1])
     shift = rng.uniform(-1, 1, _NUM_FEATURES)
-    ridge = fit_ridge(np.maximum(rows @ kernel + shift, 0)[:, None, :], left, starts, num_channels=channels)
+    ridge = fit_ridge(
+        np.maximum(rows @ kernel + shift, 0)[:, None, :], left, starts, num_channels=channels
+    )
     weights = functools.reduce(np.matmul, ridge.factors)
     return [(kernel, shift), (weights, ridge.target_mean - ridge.input_mean.ravel() @ weights)]
 
@@ -216,7 +271,9 @@ def _deviations(windows: np.ndarray) -> np.ndarray:
 
 def block_edges(begin: int, end: int, window: int) -> np.ndarray:
     """Returns the edges of contiguous blocks of about equal length between two samples; raises InputError if one is shorter than a window."""
-    num_blocks = int(np.clip((end - begin) // (_WINDOWS_IN_BLOCK * window), NUM_FOLDS, _MOST_BLOCKS))
+    num_blocks = int(
+        np.clip((end - begin) // (_WINDOWS_IN_BLOCK * window), NUM_FOLDS, _MOST_BLOCKS)
+    )
     edges = np.linspace(begin, end, num_blocks + 1).round().astype(np.int64)
     if np.diff(edges).min() < window:
         raise InputError(
@@ -226,7 +283,9 @@ def block_edges(begin: int, end: int, window: int) -> np.ndarray:
     return edges
 
 
-def split_fold(starts: np.ndarray, window: int, edges: np.ndarray, fold: int) -> tuple[np.ndarray, np.ndarray]:
+def split_fold(
+    starts: np.ndarray, window: int, edges: np.ndarray, fold: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Splits windows, which may overlap, into training windows and held-out windows that share no sample; returns the indices of both.
 
     Block `b` is held out if `b % NUM_FOLDS == fold`. A window across the edge of a held-out block is in neither set.

@@ -17,17 +17,30 @@ class Enhancer:
     window: int  # samples of a window
     columns: int
     channels: int
-    centre: np.ndarray  # of each coarse column, which is subtracted first, float32 of shape `(columns,)`
-    bias: np.ndarray  # output for coarse windows at their centre, float32 of shape `(window * channels,)`
-    factors: tuple[np.ndarray, ...] = ()  # matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs
-    layers: tuple[tuple[np.ndarray, np.ndarray], ...] = ()  # kernel and bias of each Dense layer of a network beside the linear map
-    main: tuple[np.ndarray, np.ndarray] | None = None  # for candidates that keep the coarse shape: the column of each channel, and its gain
+    centre: (
+        np.ndarray
+    )  # of each coarse column, which is subtracted first, float32 of shape `(columns,)`
+    bias: (
+        np.ndarray
+    )  # output for coarse windows at their centre, float32 of shape `(window * channels,)`
+    factors: tuple[
+        np.ndarray, ...
+    ] = ()  # matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs
+    layers: tuple[
+        tuple[np.ndarray, np.ndarray], ...
+    ] = ()  # kernel and bias of each Dense layer of a network beside the linear map
+    main: tuple[np.ndarray, np.ndarray] | None = (
+        None  # for candidates that keep the coarse shape: the column of each channel, and its gain
+    )
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
         """Maps coarse windows of shape `(windows, samples, columns)` to enhanced windows, float32 of shape `(windows, samples, channels)`."""
         outputs = np.empty((len(inputs), self.window, self.channels), np.float32)
         for first in range(0, len(inputs), _CHUNK):
-            self._map(np.asarray(inputs[first : first + _CHUNK], np.float32) - self.centre, outputs[first : first + _CHUNK])
+            self._map(
+                np.asarray(inputs[first : first + _CHUNK], np.float32) - self.centre,
+                outputs[first : first + _CHUNK],
+            )
         return outputs
 
     def _map(self, inputs: np.ndarray, outputs: np.ndarray) -> None:
@@ -55,10 +68,16 @@ class Enhancer:
 
 def run_starts(num_samples: int, window: int, hop: int | None = None) -> np.ndarray:
     """Returns the starts of windows that cover a run, one each `hop` samples (None: a quarter of a window) and the last one at its end."""
-    return np.unique(np.append(np.arange(0, num_samples - window + 1, hop or max(1, window // 4)), num_samples - window))
+    return np.unique(
+        np.append(
+            np.arange(0, num_samples - window + 1, hop or max(1, window // 4)), num_samples - window
+        )
+    )
 
 
-def average_windows(windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int) -> np.ndarray:
+def average_windows(
+    windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int
+) -> np.ndarray:
     """Averages overlapping windows into one series `(num_samples, channels)`, with weights that fall to zero at both ends of a window.
 
     `windows_at` returns some of the windows, given by a slice of their numbers, and `starts` are their first samples.

@@ -45,5 +45,7 @@ class OutOfRange:
                 coordinates = centred @ self._components.T
                 left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
             nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
-            scores[begin : begin + _CHUNK] = np.sqrt((left + _WEIGHT * nearest) / centred.shape[1]) / self._unit
+            scores[begin : begin + _CHUNK] = (
+                np.sqrt((left + _WEIGHT * nearest) / centred.shape[1]) / self._unit
+            )
         return scores

@@ -10,7 +10,9 @@ import numpy as np
 
 from enhsim_tf.telemetry.windows import time_blocks
 
-PENALTIES = tuple(float(penalty) for penalty in np.logspace(-3, 6, 19))  # of standardised inputs, so they fit every unit
+PENALTIES = tuple(
+    float(penalty) for penalty in np.logspace(-3, 6, 19)
+)  # of standardised inputs, so they fit every unit
 _NUM_BLOCKS = 5  # of time, for cross-validation
 _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest value is constant
 
@@ -19,7 +21,9 @@ _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest
 class Ridge:
     """A fitted ridge regression from input windows to target windows; all arrays are float64."""
 
-    factors: tuple[np.ndarray, ...]  # their product is of shape `(samples * columns, outputs)`: one, or two that hold fewer numbers
+    factors: tuple[
+        np.ndarray, ...
+    ]  # their product is of shape `(samples * columns, outputs)`: one, or two that hold fewer numbers
     input_mean: np.ndarray  # mean training window, shape `(samples, columns)`
     target_mean: np.ndarray  # mean training target, shape `(outputs,)`
     chosen: tuple[float, ...]  # the penalty of each channel
@@ -67,8 +71,13 @@ def fit_ridge(
     windows = windows[:, :, None] if windows.ndim == 2 else windows
     starts = np.arange(len(windows)) * windows.shape[1] if starts is None else np.asarray(starts)
     if chosen is None:
-        chosen = _choose_penalties(windows, targets, starts, np.asarray(penalties, np.float64), num_channels)
-    solution, each = RidgeSolution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
+        chosen = _choose_penalties(
+            windows, targets, starts, np.asarray(penalties, np.float64), num_channels
+        )
+    solution, each = (
+        RidgeSolution(windows, targets),
+        np.tile(chosen, targets.shape[1] // num_channels),
+    )
     left, right = solution.basis / solution.scale[:, None], solution.coefficients(each)
     is_low_rank = left.size + right.size < len(left) * right.shape[1]
     factors = (left, right) if is_low_rank else (left @ right,)
@@ -76,16 +85,25 @@ def fit_ridge(
 
 
 def _choose_penalties(
-    windows: np.ndarray, targets: np.ndarray, starts: np.ndarray, penalties: np.ndarray, num_channels: int
+    windows: np.ndarray,
+    targets: np.ndarray,
+    starts: np.ndarray,
+    penalties: np.ndarray,
+    num_channels: int,
 ) -> list[float]:
     """Returns the penalty of each channel with the least error on held-out blocks of time; of a single window, the largest."""
     squares, power = np.zeros((len(penalties), num_channels)), np.zeros(num_channels)
     for training, held_out in time_blocks(starts, _NUM_BLOCKS, windows.shape[1]):
         solution = RidgeSolution(windows[training], targets[training])
-        inner, centred = solution.project(windows[held_out]), targets[held_out] - solution.target_mean
+        inner, centred = (
+            solution.project(windows[held_out]),
+            targets[held_out] - solution.target_mean,
+        )
         power += _by_channel((targets[held_out] - targets.mean(axis=0)) ** 2, num_channels)
         for number, penalty in enumerate(penalties):
-            squares[number] += _by_channel((centred - inner @ solution.coefficients(penalty)) ** 2, num_channels)
+            squares[number] += _by_channel(
+                (centred - inner @ solution.coefficients(penalty)) ** 2, num_channels
+            )
     errors = np.sqrt(squares / np.where(power > 0, power, 1.0))
     return [penalties[found == found.min()].max() for found in errors.T]
 
@@ -103,7 +121,9 @@ class RidgeSolution:
 
     def __init__(self, windows: np.ndarray, targets: np.ndarray):
         self.input_mean, self.target_mean = windows.mean(axis=0), targets.mean(axis=0)
-        deviation = np.sqrt(np.mean((windows - self.input_mean) ** 2, axis=(0, 1)))  # of each column about its mean window
+        deviation = np.sqrt(
+            np.mean((windows - self.input_mean) ** 2, axis=(0, 1))
+        )  # of each column about its mean window
         is_constant = deviation <= _ROUNDING * np.abs(windows).max(axis=(0, 1))
         self.scale = np.tile(np.where(is_constant, 1.0, deviation), windows.shape[1])
         design, outputs = self._standardised(windows), targets - self.target_mean

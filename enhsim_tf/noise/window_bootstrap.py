@@ -10,7 +10,9 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.noise.names import MATCHED, NOISES, NONE, RESIDUAL_WINDOWS
 
 _NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over these segments
-_EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
+_EQUAL = (
+    0.01  # signals that differ by less than this share of their standard deviation count as equal
+)
 _BATCH = 2**19  # distances that are computed at a time, few enough for a processor's cache
 _MOST_LANDMARKS = 2_500  # stored signals whose neighbours are found, which bounds the time
 
@@ -44,38 +46,55 @@ class WindowBootstrap:
     """
 
     def __init__(self, windows: np.ndarray, signals: np.ndarray | None = None):
-        self.windows, self.signals = np.asarray(windows, np.float32), None if signals is None else np.asarray(signals, np.float32)
+        self.windows, self.signals = (
+            np.asarray(windows, np.float32),
+            None if signals is None else np.asarray(signals, np.float32),
+        )
 
     @classmethod
     def fit(cls, windows: np.ndarray, signal: np.ndarray) -> "WindowBootstrap":
         """Stores windows of noise and the signal below them, of the same shape, which the noise follows."""
         shape = np.shape(windows)
         signal, edges = _checked_signal(signal, shape), _edges(shape[1])
-        sums = np.add.reduceat(np.asarray(signal, np.float64).reshape(*shape[:2], -1), edges[:-1], axis=1)
+        sums = np.add.reduceat(
+            np.asarray(signal, np.float64).reshape(*shape[:2], -1), edges[:-1], axis=1
+        )
         return cls(windows, (sums / np.diff(edges)[:, None]).reshape(shape[0], -1))
 
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+    def generate(
+        self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None
+    ) -> np.ndarray:
         """Draws windows, float32 of shape `(number, samples, channels)`; `signal` is what the noise is added to, in the unit of the fit."""
         return self.windows[self._draw(self._nearest(signal, number), rng)]
 
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+    def generate_series(
+        self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None
+    ) -> np.ndarray:
         """Draws a series of any length without seams, float32 of shape `(num_samples, channels)`; see `generate`."""
         window, follows = self.windows.shape[1], self.signals is not None
         fade = window // 4
         hop = window - fade
-        lead = fade + int(rng.integers(0, hop))  # samples before the first one, so that every sample has the same distribution
+        lead = fade + int(
+            rng.integers(0, hop)
+        )  # samples before the first one, so that every sample has the same distribution
         starts = hop * np.arange(-(-(num_samples + lead) // hop)) - lead
         below = None
         if follows:
-            signal = _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(np.float32)
+            signal = _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(
+                np.float32
+            )
             below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)]
         near = self._nearest(below, len(starts))
         used, place = np.unique(near, return_inverse=True)
         common = np.stack([self.windows[self._groups[each]].mean(axis=0) for each in used])[place]
         drawn = self.windows[self._draw(near, rng)]
         rise = np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade)
-        weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]]).reshape(-1, *[1] * (drawn.ndim - 2))
-        pieces = weights * (drawn - common) + weights**2 * common  # the squares of the weights of two neighbours add up to one
+        weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]]).reshape(
+            -1, *[1] * (drawn.ndim - 2)
+        )
+        pieces = (
+            weights * (drawn - common) + weights**2 * common
+        )  # the squares of the weights of two neighbours add up to one
         series = np.zeros((len(starts) * hop + fade, *drawn.shape[2:]))
         for number, piece in enumerate(pieces):
             series[number * hop : number * hop + window] += piece
@@ -91,7 +110,10 @@ class WindowBootstrap:
     def _draw(self, near: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Draws one of the neighbours of each landmark."""
         sizes = np.array([len(some) for some in self._groups])
-        begins, places = np.cumsum(sizes) - sizes, (rng.random(len(near)) * sizes[near]).astype(np.int64)
+        begins, places = (
+            np.cumsum(sizes) - sizes,
+            (rng.random(len(near)) * sizes[near]).astype(np.int64),
+        )
         return np.concatenate(self._groups)[begins[near] + places]
 
     @property
@@ -114,7 +136,10 @@ class _Neighbours:
 
     def __init__(self, signals: np.ndarray, window: int, channels: int):
         signals = signals.reshape(len(signals), -1, channels)
-        lengths, centre = np.diff(_edges(window)), signals.mean(axis=0, dtype=np.float64).astype(np.float32)
+        lengths, centre = (
+            np.diff(_edges(window)),
+            signals.mean(axis=0, dtype=np.float64).astype(np.float32),
+        )
         known = signals - centre.astype(np.float64)
         spread = np.std(known, axis=(0, 1))
         unit = np.where(spread > 0, spread, 1.0)
@@ -123,14 +148,25 @@ class _Neighbours:
         held = np.cumsum(sizes[::-1] ** 2)[::-1]
         axes = axes[: max(1, np.count_nonzero(held > _EQUAL**2 * held[0]))].T
         places, equal = known @ axes, _EQUAL**2 * len(axes)
-        _, first = np.unique(np.round(places / math.sqrt(equal / axes.shape[1])), axis=0, return_index=True)
+        _, first = np.unique(
+            np.round(places / math.sqrt(equal / axes.shape[1])), axis=0, return_index=True
+        )
         first = first[np.linspace(0, len(first) - 1, min(len(first), _MOST_LANDMARKS)).astype(int)]
-        self.of, landmarks = _nearest_of(known[first], known, equal), places[first].astype(np.float32)
+        self.of, landmarks = (
+            _nearest_of(known[first], known, equal),
+            places[first].astype(np.float32),
+        )
         # the square of a distance is that of the landmark minus twice a product, beside what is the same for all landmarks
         self._landmarks, self._halves = landmarks.T, 0.5 * np.sum(landmarks**2, axis=1)
-        self._centre = np.repeat(centre, lengths, axis=0)  # subtracted first: smaller numbers, smaller rounding errors
-        axes = axes.reshape(-1, channels, axes.shape[1]) / (lengths[:, None, None] * unit[:, None])  # from means of segments to samples
-        self._axes = np.repeat(axes, lengths, axis=0).reshape(window * channels, -1).astype(np.float32)
+        self._centre = np.repeat(
+            centre, lengths, axis=0
+        )  # subtracted first: smaller numbers, smaller rounding errors
+        axes = axes.reshape(-1, channels, axes.shape[1]) / (
+            lengths[:, None, None] * unit[:, None]
+        )  # from means of segments to samples
+        self._axes = (
+            np.repeat(axes, lengths, axis=0).reshape(window * channels, -1).astype(np.float32)
+        )
 
     def nearest(self, signal: np.ndarray) -> np.ndarray:
         """Returns the nearest landmark of each signal of shape `(windows, samples, channels)`."""
@@ -144,19 +180,30 @@ class _Neighbours:
 
 def _nearest_of(places: np.ndarray, known: np.ndarray, equal: float) -> list[np.ndarray]:
     """For each place, the nearest known ones: as many as the square root of their number, and all within the squared distance `equal`."""
-    nearest, length, found = math.ceil(math.sqrt(len(known))), np.einsum("ij,ij->i", known, known), []
+    nearest, length, found = (
+        math.ceil(math.sqrt(len(known))),
+        np.einsum("ij,ij->i", known, known),
+        [],
+    )
     step = max(1, _BATCH // len(known))
     for some in (places[begin : begin + step] for begin in range(0, len(places), step)):
-        apart = np.maximum(length - 2 * some @ known.T + np.einsum("ij,ij->i", some, some)[:, None], 0.0)
+        apart = np.maximum(
+            length - 2 * some @ known.T + np.einsum("ij,ij->i", some, some)[:, None], 0.0
+        )
         near = np.argpartition(apart, nearest - 1, axis=1)[:, :nearest]
         reach = np.take_along_axis(apart, near, axis=1).max(axis=1)
-        found += [own if far > equal else np.flatnonzero(row <= equal) for own, far, row in zip(near, reach, apart, strict=True)]
+        found += [
+            own if far > equal else np.flatnonzero(row <= equal)
+            for own, far, row in zip(near, reach, apart, strict=True)
+        ]
     return found
 
 
 def _checked_signal(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
     if signal is None or np.shape(signal) != shape:
-        raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal)}.")
+        raise InputError(
+            f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal)}."
+        )
     return np.asarray(signal)
 
 

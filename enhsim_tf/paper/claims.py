@@ -24,7 +24,12 @@ from enhsim_tf.paper.detectors import DETECTORS, threshold
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.square_wave import Signal
 
-REPRODUCED, PARTLY, NOT_REPRODUCED, NOT_MEASURED = "reproduced", "partly", "not reproduced", "not measured"
+REPRODUCED, PARTLY, NOT_REPRODUCED, NOT_MEASURED = (
+    "reproduced",
+    "partly",
+    "not reproduced",
+    "not measured",
+)
 OF_UNTESTED = {REPRODUCED: "holds", PARTLY: "holds in part", NOT_REPRODUCED: "does not hold"}
 """What is said instead of a claim that the paper itself does not test."""
 BASIC, WHOLE, OURS = "basic", "whole", "ours"
@@ -104,9 +109,20 @@ def kept(stage: str, *networks: str, version: int = 1) -> Callable[[Measure], Me
             if stage not in pipeline.measured:
                 for network in networks:
                     _ = pipeline.enhancer_folder if network == "enhancer" else pipeline.gan_folder
-                depends, after = pipeline.settings.of("windows", "noise", "claims"), ["telemetry", *networks]
-                folder = pipeline.stages.run(stage, lambda folder: save_arrays(folder, measure(pipeline)), depends, after, version)
-                pipeline.measured[stage] = {name: float(value) for name, value in load_arrays(folder).items()}
+                depends, after = (
+                    pipeline.settings.of("windows", "noise", "claims"),
+                    ["telemetry", *networks],
+                )
+                folder = pipeline.stages.run(
+                    stage,
+                    lambda folder: save_arrays(folder, measure(pipeline)),
+                    depends,
+                    after,
+                    version,
+                )
+                pipeline.measured[stage] = {
+                    name: float(value) for name, value in load_arrays(folder).items()
+                }
             return pipeline.measured[stage]
 
         return measured
@@ -120,22 +136,38 @@ def kept(stage: str, *networks: str, version: int = 1) -> Callable[[Measure], Me
 @kept("enhancement", "enhancer")
 def enhancement(pipeline: Pipeline) -> Measured:
     """Errors of the enhancer and of simple baselines that learn from the same windows, on all disjoint test windows."""
-    train, test = pipeline.windows("train", pipeline.settings.num_windows, "training windows"), pipeline.windows("test")
+    train, test = (
+        pipeline.windows("train", pipeline.settings.num_windows, "training windows"),
+        pipeline.windows("test"),
+    )
     order, blocks = np.argsort(train["start"]), KFold(5)  # neighbours in time stay in one block
     source, target = train["coarse"][order].astype(np.float64), train["target"][order]
-    ridge = GridSearchCV(Ridge(), {"alpha": np.logspace(-2, 5, 8)}, cv=blocks, scoring="neg_mean_squared_error")
+    ridge = GridSearchCV(
+        Ridge(), {"alpha": np.logspace(-2, 5, 8)}, cv=blocks, scoring="neg_mean_squared_error"
+    )
     neighbours = [number for number in (1, 3, 10, 30, 100, 300) if number <= 0.8 * len(source)]
-    nearest = GridSearchCV(KNeighborsRegressor(), {"n_neighbors": neighbours}, cv=blocks, scoring="neg_mean_squared_error")
+    nearest = GridSearchCV(
+        KNeighborsRegressor(),
+        {"n_neighbors": neighbours},
+        cv=blocks,
+        scoring="neg_mean_squared_error",
+    )
     known = {window.tobytes() for window in train["coarse"]}
     return {
         "nrmse": measures.nrmse(pipeline.enhance(test["coarse"]), test["truth"]),
         "train_nrmse": measures.nrmse(pipeline.enhance(train["coarse"]), train["truth"]),
         "coarse_nrmse": measures.nrmse(test["coarse"], test["truth"]),
-        "ridge_nrmse": measures.nrmse(ridge.fit(source, target).predict(test["coarse"]), test["truth"]),
-        "nearest_nrmse": measures.nrmse(nearest.fit(source, target).predict(test["coarse"]), test["truth"]),
+        "ridge_nrmse": measures.nrmse(
+            ridge.fit(source, target).predict(test["coarse"]), test["truth"]
+        ),
+        "nearest_nrmse": measures.nrmse(
+            nearest.fit(source, target).predict(test["coarse"]), test["truth"]
+        ),
         "share_seen": float(np.mean([window.tobytes() in known for window in test["coarse"]])),
         # errors on telemetry of one's own contain its noise
-        "allowed_nrmse": 0.15 if pipeline.is_example else measures.nrmse(test["coarse"], test["truth"]),
+        "allowed_nrmse": 0.15
+        if pipeline.is_example
+        else measures.nrmse(test["coarse"], test["truth"]),
     }
 
 
@@ -147,7 +179,9 @@ def speed(pipeline: Pipeline) -> Measured:
     """Time of the coarse simulation alone and of the whole pipeline, medians of five."""
     settings, rng, seconds = pipeline.settings, pipeline.draw("speed"), {"coarse": [], "all": []}
     begins = rng.integers(0, 10**6, settings.speed_windows)
-    times = pipeline.telemetry.interval * (begins[:, None] + np.arange(settings.window, dtype=np.float64))
+    times = pipeline.telemetry.interval * (
+        begins[:, None] + np.arange(settings.window, dtype=np.float64)
+    )
 
     def simulate() -> np.ndarray:
         return pipeline.simulator(times).astype(np.float32)
@@ -182,27 +216,39 @@ def detection(pipeline: Pipeline) -> Measured:
     noise_sd = np.std(pipeline.noise_windows("train", settings.num_windows, "noise windows"))
     noise = pipeline.draw("noise of degraded telemetry")
     faults = [degraded_windows(pipeline, mode, pipeline.truth) for mode in MODES]
-    faults = [windows + settings.noise_sd * noise.standard_normal(windows.shape) for windows in faults]
+    faults = [
+        windows + settings.noise_sd * noise.standard_normal(windows.shape) for windows in faults
+    ]
 
     def training_data(purpose: str) -> dict[str, np.ndarray]:
-        drawn, rng = pipeline.windows("train", settings.detector_windows, purpose), pipeline.draw(f"noise, {purpose}")
+        drawn, rng = (
+            pipeline.windows("train", settings.detector_windows, purpose),
+            pipeline.draw(f"noise, {purpose}"),
+        )
         clean = pipeline.enhance(drawn["coarse"])
         return {
             "coarse": drawn["coarse"],
             "enhanced": clean,
             "enhanced + GAN noise": clean + pipeline.generate_noise(len(clean), rng),
-            "enhanced + Gaussian noise": clean + noise_sd * rng.standard_normal(clean.shape, np.float32),
+            "enhanced + Gaussian noise": clean
+            + noise_sd * rng.standard_normal(clean.shape, np.float32),
             "real": drawn["target"],
         }
 
-    fitted, held_out, found = training_data("detectors, fitted"), training_data("detectors, thresholds"), {}
+    fitted, held_out, found = (
+        training_data("detectors, fitted"),
+        training_data("detectors, thresholds"),
+        {},
+    )
     held_out["real"] = pipeline.windows("calibration")["target"]
     for data, windows in fitted.items():
         for name, fit in DETECTORS.items():
             score = fit(windows, settings)
             limit = threshold(score(held_out[data]), settings.false_alarm_rate)
             found[f"false alarms, {data}, {name}"] = float(np.mean(score(nominal) > limit))
-            found[f"recall, {data}, {name}"] = float(np.mean([np.mean(score(each) > limit) for each in faults]))
+            found[f"recall, {data}, {name}"] = float(
+                np.mean([np.mean(score(each) > limit) for each in faults])
+            )
     return found
 
 
@@ -221,8 +267,12 @@ def robust(pipeline: Pipeline) -> Measured:
     if not found:
         return {}
     for name in DETECTORS:
-        rate, real = (found[f"false alarms, {data}, {name}"] for data in ("enhanced + GAN noise", "real"))
-        recall, real_recall = (found[f"recall, {data}, {name}"] for data in ("enhanced + GAN noise", "real"))
+        rate, real = (
+            found[f"false alarms, {data}, {name}"] for data in ("enhanced + GAN noise", "real")
+        )
+        recall, real_recall = (
+            found[f"recall, {data}, {name}"] for data in ("enhanced + GAN noise", "real")
+        )
         is_met.append(rate <= 2 * real + 0.01 and recall >= real_recall - 0.05)
     return {"share_of_detectors": float(np.mean(is_met))} | found
 
@@ -239,7 +289,10 @@ def settling(pipeline: Pipeline) -> Measured:
     history, settings = pipeline.history, pipeline.settings
     if settings.rounds < 2:
         return {}
-    iteration, is_late = history["iteration"], history["iteration"] > 0.75 * history["iteration"][-1]
+    iteration, is_late = (
+        history["iteration"],
+        history["iteration"] > 0.75 * history["iteration"][-1],
+    )
     scale, lag = np.log(np.maximum(history["sd"], 1e-12)), history["lag_one"]
     apart = np.abs(scale - np.median(scale[is_late])), np.abs(lag - np.median(lag[is_late]))
     is_bad = np.flatnonzero((apart[0] > 0.1) | (apart[1] > 0.05))
@@ -275,8 +328,13 @@ def balance(pipeline: Pipeline) -> Measured:
 def binomial_interval(share: float, number: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a share of `number` independent rows."""
     z = 1.959964
-    middle, width = share + z**2 / (2 * number), z * np.sqrt(share * (1 - share) / number + z**2 / (4 * number**2))
-    return float((middle - width) / (1 + z**2 / number)), float((middle + width) / (1 + z**2 / number))
+    middle, width = (
+        share + z**2 / (2 * number),
+        z * np.sqrt(share * (1 - share) / number + z**2 / (4 * number**2)),
+    )
+    return float((middle - width) / (1 + z**2 / number)), float(
+        (middle + width) / (1 + z**2 / number)
+    )
 
 
 # -- C6 and C7 ---------------------------------------------------------------------------------------------------------
@@ -287,8 +345,13 @@ def resemblance(generated: np.ndarray, real: np.ndarray, again: np.ndarray, seed
 
     A classifier separates them, and also other real windows, `again`, from `real`: as they are, and louder by `LOUDER`.
     """
-    lag, real_lag = (float(measures.autocorrelation(windows, 1)[1]) for windows in (generated, real))
-    auc = {name: two_sample_auc(windows, real, seed) for name, windows in (("", generated), ("floor_", again), ("louder_", LOUDER * again))}
+    lag, real_lag = (
+        float(measures.autocorrelation(windows, 1)[1]) for windows in (generated, real)
+    )
+    auc = {
+        name: two_sample_auc(windows, real, seed)
+        for name, windows in (("", generated), ("floor_", again), ("louder_", LOUDER * again))
+    }
     # half of what separates the real noise from white noise, from twice the 95 % interval of white noise up to .05
     lag_unit = np.clip(abs(real_lag), 8 / np.sqrt(real.size), 0.1)
     return {
@@ -311,7 +374,9 @@ def noise_resemblance(pipeline: Pipeline) -> Measured:
     """C6: generated noise beside the noise of the test part."""
     real = pipeline.noise_windows("test")
     generated = pipeline.generate_noise(len(real), pipeline.draw("noise, compared"))
-    return resemblance(generated, real, pipeline.noise_windows("train")[: len(real)], pipeline.settings.seed)
+    return resemblance(
+        generated, real, pipeline.noise_windows("train")[: len(real)], pipeline.settings.seed
+    )
 
 
 @kept("sum resemblance", "enhancer", "noise GAN")
@@ -319,21 +384,33 @@ def sum_resemblance(pipeline: Pipeline) -> Measured:
     """C7: the sum of both networks beside the telemetry of the test part."""
     test = pipeline.windows("test")
     combined = pipeline.combine(test["coarse"], pipeline.draw("sum, compared"))
-    return resemblance(combined, test["target"], pipeline.windows("train")["target"][: len(combined)], pipeline.settings.seed)
+    return resemblance(
+        combined,
+        test["target"],
+        pipeline.windows("train")["target"][: len(combined)],
+        pipeline.settings.seed,
+    )
 
 
 # -- C9 ----------------------------------------------------------------------------------------------------------------
 
 
-def degraded_windows(pipeline: Pipeline, mode: str, signal: Signal, severity: float | None = None) -> np.ndarray:
+def degraded_windows(
+    pipeline: Pipeline, mode: str, signal: Signal, severity: float | None = None
+) -> np.ndarray:
     """Windows of a signal in a degraded mode; the true signal and the simulation get the same times and draws."""
     settings = pipeline.settings
     severity = settings.severity if severity is None else severity
     begins = pipeline.draw("degraded windows").integers(0, 10**6, settings.detector_windows)
     times = settings.interval * (begins[:, None] + np.arange(settings.window, dtype=np.float64))
-    size, onset = settings.orbit_amplitude + settings.rotation_amplitude, int(ONSET * settings.window)
+    size, onset = (
+        settings.orbit_amplitude + settings.rotation_amplitude,
+        int(ONSET * settings.window),
+    )
     draws = pipeline.draw(f"degraded {mode}")
-    return degrade(signal, times, mode, severity, (-size, size), settings.rotation_period, draws, onset).astype(np.float32)
+    return degrade(
+        signal, times, mode, severity, (-size, size), settings.rotation_period, draws, onset
+    ).astype(np.float32)
 
 
 @kept("degraded", "enhancer")
@@ -343,12 +420,21 @@ def degraded_errors(pipeline: Pipeline) -> Measured:
         return {}
     found = {}
     for mode in ("nominal", *MODES):
-        coarse, truth = (degraded_windows(pipeline, mode, signal) for signal in (pipeline.simulator, pipeline.truth))
+        coarse, truth = (
+            degraded_windows(pipeline, mode, signal)
+            for signal in (pipeline.simulator, pipeline.truth)
+        )
         found[f"nrmse, {mode}"] = measures.nrmse(pipeline.enhance(coarse), truth)
         found[f"coarse nrmse, {mode}"] = measures.nrmse(coarse, truth)
     errors = {mode: found[f"nrmse, {mode}"] for mode in MODES}
-    is_met = [error <= 2 * found["nrmse, nominal"] and error < found[f"coarse nrmse, {mode}"] for mode, error in errors.items()]
-    return {"share_of_modes": float(np.mean(is_met)), "worst_ratio": max(errors.values()) / found["nrmse, nominal"]} | found
+    is_met = [
+        error <= 2 * found["nrmse, nominal"] and error < found[f"coarse nrmse, {mode}"]
+        for mode, error in errors.items()
+    ]
+    return {
+        "share_of_modes": float(np.mean(is_met)),
+        "worst_ratio": max(errors.values()) / found["nrmse, nominal"],
+    } | found
 
 
 CLAIMS = (
@@ -359,9 +445,23 @@ CLAIMS = (
         "2.2",
         "fig04_enhanced_simulation",
         (
-            Limit("nrmse", "error on held-out windows, in standard deviations of the true signal", high="coarse_nrmse"),
-            Limit("nrmse", "error on held-out windows, in standard deviations of the true signal", high="allowed_nrmse", decides=WHOLE),
-            Limit("nrmse", "the same error, compared with that of ridge regression", high="ridge_nrmse", decides=OURS),
+            Limit(
+                "nrmse",
+                "error on held-out windows, in standard deviations of the true signal",
+                high="coarse_nrmse",
+            ),
+            Limit(
+                "nrmse",
+                "error on held-out windows, in standard deviations of the true signal",
+                high="allowed_nrmse",
+                decides=WHOLE,
+            ),
+            Limit(
+                "nrmse",
+                "the same error, compared with that of ridge regression",
+                high="ridge_nrmse",
+                decides=OURS,
+            ),
         ),
         enhancement,
     ),
@@ -373,9 +473,23 @@ CLAIMS = (
         "fig04_enhanced_simulation",
         (
             Limit("times_real_time", "seconds of telemetry generated in a second", low=10_000),
-            Limit("gain_over_fine", "times as fast as a fine simulator of a battery, timed in its study", low=1),
-            Limit("ratio_to_simulator", "time divided by that of a battery's coarse simulator, timed in its study", high=2, decides=WHOLE),
-            Limit("ratio_to_formula", "time divided by that of the square waves, one line of NumPy", high=2, decides=OURS),
+            Limit(
+                "gain_over_fine",
+                "times as fast as a fine simulator of a battery, timed in its study",
+                low=1,
+            ),
+            Limit(
+                "ratio_to_simulator",
+                "time divided by that of a battery's coarse simulator, timed in its study",
+                high=2,
+                decides=WHOLE,
+            ),
+            Limit(
+                "ratio_to_formula",
+                "time divided by that of the square waves, one line of NumPy",
+                high=2,
+                decides=OURS,
+            ),
         ),
         speed,
         margin=20.0,
@@ -387,8 +501,15 @@ CLAIMS = (
         "2.2",
         "fig04_enhanced_simulation",
         (
-            Limit("most_false_alarms", "largest false-alarm rate of a detector set to 1 %", low=0.1),
-            Limit("least_false_alarms", "smallest false-alarm rate of a detector set to 1 %", low=0.1, decides=WHOLE),
+            Limit(
+                "most_false_alarms", "largest false-alarm rate of a detector set to 1 %", low=0.1
+            ),
+            Limit(
+                "least_false_alarms",
+                "smallest false-alarm rate of a detector set to 1 %",
+                low=0.1,
+                decides=WHOLE,
+            ),
         ),
         too_clean,
     ),
@@ -399,8 +520,17 @@ CLAIMS = (
         "2.3",
         "fig12_accuracy_loss",
         (
-            Limit("settled_at", "iteration from which the generated noise no longer changes", high=1_500),
-            Limit("settled_at", "iteration from which the generated noise no longer changes", low=500, decides=WHOLE),
+            Limit(
+                "settled_at",
+                "iteration from which the generated noise no longer changes",
+                high=1_500,
+            ),
+            Limit(
+                "settled_at",
+                "iteration from which the generated noise no longer changes",
+                low=500,
+                decides=WHOLE,
+            ),
         ),
         settling,
     ),
@@ -411,10 +541,27 @@ CLAIMS = (
         "2.3",
         "fig12_accuracy_loss",
         (
-            Limit("late_high", "share classified correctly in the second half of training, upper end of its interval", low=0.5),
-            Limit("late_low", "share classified correctly in the second half of training, lower end of its interval", high=0.8),
-            Limit("late_least", "the same share of the kind, real or generated, with the smaller one", low=0.2),
-            Limit("early_low", "share in the first half, lower end of its interval", low=0.5, decides=WHOLE),
+            Limit(
+                "late_high",
+                "share classified correctly in the second half of training, upper end of its interval",
+                low=0.5,
+            ),
+            Limit(
+                "late_low",
+                "share classified correctly in the second half of training, lower end of its interval",
+                high=0.8,
+            ),
+            Limit(
+                "late_least",
+                "the same share of the kind, real or generated, with the smaller one",
+                low=0.2,
+            ),
+            Limit(
+                "early_low",
+                "share in the first half, lower end of its interval",
+                low=0.5,
+                decides=WHOLE,
+            ),
         ),
         balance,
     ),
@@ -426,10 +573,25 @@ CLAIMS = (
         "fig06_real_or_generated_noise",
         (
             Limit("scale_difference", "log ratio of the standard deviations", high=0.1),
-            Limit("lag_one_error", "error of the lag-1 correlation, in units of its distance from white noise", high=0.5),
-            Limit("marginal_distance", "distance of the distributions of values, in standard deviations", high=0.1),
-            Limit("rank_ratio", "effective rank divided by that of real noise", low=0.8, decides=WHOLE),
-            Limit("auc", "AUC of a classifier, compared with real noise 10 % louder", high="allowed_auc", decides=WHOLE),
+            Limit(
+                "lag_one_error",
+                "error of the lag-1 correlation, in units of its distance from white noise",
+                high=0.5,
+            ),
+            Limit(
+                "marginal_distance",
+                "distance of the distributions of values, in standard deviations",
+                high=0.1,
+            ),
+            Limit(
+                "rank_ratio", "effective rank divided by that of real noise", low=0.8, decides=WHOLE
+            ),
+            Limit(
+                "auc",
+                "AUC of a classifier, compared with real noise 10 % louder",
+                high="allowed_auc",
+                decides=WHOLE,
+            ),
         ),
         noise_resemblance,
     ),
@@ -441,9 +603,23 @@ CLAIMS = (
         "fig13_combined",
         (
             Limit("scale_difference", "log ratio of the standard deviations", high=0.1),
-            Limit("marginal_distance", "distance of the distributions of values, in standard deviations", high=0.1),
-            Limit("roughness_ratio", "standard deviation of first differences divided by the real one", low=0.8, high=1.25),
-            Limit("auc", "AUC of a classifier, compared with telemetry 10 % larger", high="allowed_auc", decides=WHOLE),
+            Limit(
+                "marginal_distance",
+                "distance of the distributions of values, in standard deviations",
+                high=0.1,
+            ),
+            Limit(
+                "roughness_ratio",
+                "standard deviation of first differences divided by the real one",
+                low=0.8,
+                high=1.25,
+            ),
+            Limit(
+                "auc",
+                "AUC of a classifier, compared with telemetry 10 % larger",
+                high="allowed_auc",
+                decides=WHOLE,
+            ),
         ),
         sum_resemblance,
     ),
@@ -454,8 +630,17 @@ CLAIMS = (
         "title, abstract",
         "fig13_combined",
         (
-            Limit("share_of_detectors", "share of detectors as good as if trained on telemetry", low=0.5),
-            Limit("share_of_detectors", "share of detectors as good as if trained on telemetry", low=1.0, decides=WHOLE),
+            Limit(
+                "share_of_detectors",
+                "share of detectors as good as if trained on telemetry",
+                low=0.5,
+            ),
+            Limit(
+                "share_of_detectors",
+                "share of detectors as good as if trained on telemetry",
+                low=1.0,
+                decides=WHOLE,
+            ),
         ),
         robust,
         is_tested=False,
@@ -467,8 +652,17 @@ CLAIMS = (
         "1, 3",
         "fig04_enhanced_simulation",
         (
-            Limit("share_of_modes", "share of degraded modes with at most twice the nominal error", low=0.5),
-            Limit("share_of_modes", "share of degraded modes with at most twice the nominal error", low=1.0, decides=WHOLE),
+            Limit(
+                "share_of_modes",
+                "share of degraded modes with at most twice the nominal error",
+                low=0.5,
+            ),
+            Limit(
+                "share_of_modes",
+                "share of degraded modes with at most twice the nominal error",
+                low=1.0,
+                decides=WHOLE,
+            ),
         ),
         degraded_errors,
         is_tested=False,
@@ -480,7 +674,10 @@ def verdict(limits: tuple[Limit, ...], measured: Measured) -> str:
     """The verdict on a claim with these limits."""
     if not measured:
         return NOT_MEASURED
-    holds = {kind: all(limit.holds(measured) for limit in limits if limit.decides == kind) for kind in (BASIC, WHOLE)}
+    holds = {
+        kind: all(limit.holds(measured) for limit in limits if limit.decides == kind)
+        for kind in (BASIC, WHOLE)
+    }
     return NOT_REPRODUCED if not holds[BASIC] else REPRODUCED if holds[WHOLE] else PARTLY
 
 
@@ -501,8 +698,16 @@ def judge(claim: Claim, measured: Measured) -> dict[str, Any]:
     ]
     found = verdict(claim.limits, measured)
     counted = [limit for limit in limits if limit["decides"] != OURS]
-    failed = [limit for kind in (BASIC, WHOLE) for limit in counted if limit["decides"] == kind and not limit["holds"]]
-    about = {name: getattr(claim, name) for name in ("id", "short", "sentence", "section", "figure", "is_tested")}
+    failed = [
+        limit
+        for kind in (BASIC, WHOLE)
+        for limit in counted
+        if limit["decides"] == kind and not limit["holds"]
+    ]
+    about = {
+        name: getattr(claim, name)
+        for name in ("id", "short", "sentence", "section", "figure", "is_tested")
+    }
     return about | {
         "verdict": found if claim.is_tested else OF_UNTESTED.get(found, found),
         "deciding": (failed or counted[-1:] or [None])[0],

@@ -40,7 +40,9 @@ def degrade(
         ValueError: If there is no such mode.
     """
     if mode not in ("nominal", *MODES):
-        raise ValueError(f"Expected a mode, nominal or one of {', '.join(MODES)}. Received: {mode!r}.")
+        raise ValueError(
+            f"Expected a mode, nominal or one of {', '.join(MODES)}. Received: {mode!r}."
+        )
     time, late, (low, high) = time.copy(), time[:, onset:], levels
     begin = late[:, :1]
 

@@ -19,13 +19,21 @@ Score = Callable[[np.ndarray], np.ndarray]
 def pca_residual(training: np.ndarray, settings: Settings) -> Score:
     """The mean squared residual outside the principal components of the training windows."""
     with threadpool_limits(1):
-        pca = PCA(min(settings.num_components, *training.shape), svd_solver="randomized", random_state=settings.seed).fit(training)
-    return lambda windows: np.mean((windows - pca.inverse_transform(pca.transform(windows))) ** 2, axis=1)
+        pca = PCA(
+            min(settings.num_components, *training.shape),
+            svd_solver="randomized",
+            random_state=settings.seed,
+        ).fit(training)
+    return lambda windows: np.mean(
+        (windows - pca.inverse_transform(pca.transform(windows))) ** 2, axis=1
+    )
 
 
 def isolation_forest(training: np.ndarray, settings: Settings) -> Score:
     """The anomaly score of an isolation forest (Liu, Ting and Zhou 2008) on fourteen features of each window."""
-    forest = IsolationForest(n_estimators=settings.num_trees, random_state=settings.seed).fit(window_features(training))
+    forest = IsolationForest(n_estimators=settings.num_trees, random_state=settings.seed).fit(
+        window_features(training)
+    )
     return lambda windows: -forest.score_samples(window_features(windows))
 
 
@@ -34,7 +42,9 @@ def dense_autoencoder(training: np.ndarray, settings: Settings) -> Score:
     mean, scale = np.mean(training), np.std(training)
     standardised = ((training - mean) / scale).astype(np.float32)
     network = keras.Sequential([keras.Input(training.shape[1:])], name="autoencoder")
-    for number, (units, activation) in enumerate(((128, "relu"), (16, "relu"), (128, "relu"), (training.shape[1], "linear"))):
+    for number, (units, activation) in enumerate(
+        ((128, "relu"), (16, "relu"), (128, "relu"), (training.shape[1], "linear"))
+    ):
         kernel = keras.initializers.HeUniform(seed=1_000 * settings.seed + number)
         network.add(keras.layers.Dense(units, activation, kernel_initializer=kernel))
     network.compile("adam", "mean_squared_error", jit_compile=False)
@@ -48,7 +58,11 @@ def dense_autoencoder(training: np.ndarray, settings: Settings) -> Score:
     return score
 
 
-DETECTORS = {"PCA residual": pca_residual, "isolation forest": isolation_forest, "dense autoencoder": dense_autoencoder}
+DETECTORS = {
+    "PCA residual": pca_residual,
+    "isolation forest": isolation_forest,
+    "dense autoencoder": dense_autoencoder,
+}
 
 
 def threshold(scores: np.ndarray, rate: float) -> float:

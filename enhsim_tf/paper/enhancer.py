@@ -43,7 +43,9 @@ def build_enhancer(settings: Settings, num_inputs: int | None = None) -> keras.S
 class Pairs(keras.utils.PyDataset):
     """Batches of source windows and their targets, float32 of shape `(windows, samples)`; `rng` shuffles them before each epoch."""
 
-    def __init__(self, source: np.ndarray, target: np.ndarray, batch_size: int, rng: np.random.Generator):
+    def __init__(
+        self, source: np.ndarray, target: np.ndarray, batch_size: int, rng: np.random.Generator
+    ):
         super().__init__()
         self.source, self.target, self.batch_size, self.rng = source, target, batch_size, rng
         self.order = rng.permutation(len(source))
@@ -85,11 +87,20 @@ def train_enhancer(
         The history of Keras.
     """
     is_fast = settings.fast and is_wide_dense_stack(network)
-    trained = BlockwiseTraining(network) if is_fast else network  # the same mathematics, one block of a kernel at a time
+    trained = (
+        BlockwiseTraining(network) if is_fast else network
+    )  # the same mathematics, one block of a kernel at a time
     adam = (fused_adam if is_fast else keras.optimizers.Adam)(settings.learning_rate)
     trained.compile(adam, settings.loss, jit_compile=False)
     pairs = Pairs(source, target, settings.batch_size, np.random.default_rng(settings.seed))
-    history = trained.fit(pairs, epochs=settings.epochs, validation_data=validation, callbacks=list(callbacks), shuffle=False, verbose=0)
+    history = trained.fit(
+        pairs,
+        epochs=settings.epochs,
+        validation_data=validation,
+        callbacks=list(callbacks),
+        shuffle=False,
+        verbose=0,
+    )
     if is_fast:
         trained.write_back()
     return history.history
@@ -102,5 +113,8 @@ def enhance(network: keras.Sequential, coarse: np.ndarray) -> np.ndarray:
 
 def predict(network: keras.Model, inputs: np.ndarray, batch_size: int = 1_024) -> np.ndarray:
     """`network.predict` without the seconds that its data pipeline costs, batch by batch."""
-    batches = [network.predict_on_batch(inputs[first : first + batch_size]) for first in range(0, len(inputs), batch_size)]
+    batches = [
+        network.predict_on_batch(inputs[first : first + batch_size])
+        for first in range(0, len(inputs), batch_size)
+    ]
     return np.concatenate(batches)

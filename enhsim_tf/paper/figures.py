@@ -66,7 +66,9 @@ def paper_figure(name: str, title: str) -> Callable[[Draw], Draw]:
 def sample(pipeline: Pipeline, part: str, number: int, purpose: str) -> dict[str, np.ndarray]:
     """Some windows of a part, and the minutes since the beginning of each as `minutes`."""
     drawn = pipeline.windows(part, number, purpose)
-    return drawn | {"minutes": pipeline.telemetry.interval / 60 * np.arange(pipeline.settings.window)}
+    return drawn | {
+        "minutes": pipeline.telemetry.interval / 60 * np.arange(pipeline.settings.window)
+    }
 
 
 @paper_figure("fig01_pipeline", "Enhanced simulation pipeline")
@@ -80,11 +82,18 @@ def pipeline_diagram(pipeline: Pipeline) -> None:
 def training_pairs(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Three training windows: above the coarse simulation, a sum of square waves, below the telemetry of the same time."""
     pairs = sample(pipeline, "train", 3, "figure 2")
-    figure, down = new_sheet(DOUBLE, 3.1, "The simulator has the rhythm of the telemetry, not its shape", "Windows begin at random times.")
+    figure, down = new_sheet(
+        DOUBLE,
+        3.1,
+        "The simulator has the rhythm of the telemetry, not its shape",
+        "Windows begin at random times.",
+    )
     axes = panels(figure, down + 0.2, 2, 3, sharex=True, sharey=True)
     begins = pipeline.parts["train"].time[pairs["start"]]
     for column, begin in enumerate(begins):
-        axes[0, column].set_title(f"from day {begin / 86_400:.2f}", loc="right", color=QUIET, size=7)
+        axes[0, column].set_title(
+            f"from day {begin / 86_400:.2f}", loc="right", color=QUIET, size=7
+        )
         axes[0, column].plot(pairs["minutes"], pairs["coarse"][column], color=COARSE, linewidth=1.2)
         axes[1, column].plot(pairs["minutes"], pairs["target"][column], color=REAL, linewidth=0.6)
     for row, name in enumerate(("Source", "Target")):
@@ -105,19 +114,31 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     window = sample(pipeline, "test", 1, "figure 4")
     enhanced, truth = pipeline.enhance(window["coarse"])[0], window["truth"][0]
     errors = enhancement(pipeline)
-    words = ", ".join(f"{name} {errors[f'{key}nrmse']:.3f}" for name, key in (("coarse", "coarse_"), ("enhanced", ""), ("ridge", "ridge_")))
+    words = ", ".join(
+        f"{name} {errors[f'{key}nrmse']:.3f}"
+        for name, key in (("coarse", "coarse_"), ("enhanced", ""), ("ridge", "ridge_"))
+    )
     figure, down = new_sheet(
         DOUBLE,
         3.5,
         "The enhancer turns steps into a waveform",
         f"A held-out window. Error on all test windows, in standard deviations of the signal: {words}.",
     )
-    above, below = panels(figure, down + 0.1, 2, 1, right=0.85, height_ratios=(3, 1), sharex=True)[:, 0]
+    above, below = panels(figure, down + 0.1, 2, 1, right=0.85, height_ratios=(3, 1), sharex=True)[
+        :, 0
+    ]
     above.plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
     above.plot(window["minutes"], enhanced, color=ENHANCED, linewidth=1.4)
     above.plot(window["minutes"], truth, color=REAL, linewidth=0.8, linestyle=DASHED)
     name = "true signal" if pipeline.is_example else "telemetry"
-    label_ends(above, {"coarse": (window["coarse"][0], COARSE), "enhanced": (enhanced, ENHANCED), name: (truth, REAL)})
+    label_ends(
+        above,
+        {
+            "coarse": (window["coarse"][0], COARSE),
+            "enhanced": (enhanced, ENHANCED),
+            name: (truth, REAL),
+        },
+    )
     below.axhline(0, color=LINE, linewidth=0.6)
     below.plot(window["minutes"], enhanced - truth, color=ENHANCED, linewidth=0.8)
     beside(below, 0.5, f"enhanced\n− {name}", ENHANCED)
@@ -126,22 +147,39 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 
 def guess(
-    title: str, minutes: np.ndarray, real: np.ndarray, generated: np.ndarray, rng: np.random.Generator, hint: str = "", columns: int = 4
+    title: str,
+    minutes: np.ndarray,
+    real: np.ndarray,
+    generated: np.ndarray,
+    rng: np.random.Generator,
+    hint: str = "",
+    columns: int = 4,
 ) -> matplotlib.figure.Figure:
     """Real and generated rows in random order; which are generated is printed upside down, with a hint that would tell."""
     is_generated = np.repeat([False, True], [len(real), len(generated)])
     order = rng.permutation(len(is_generated))
     rows = -(-len(order) // columns)
-    figure, down = new_sheet(DOUBLE, (1.24 if columns > 1 else 1.3) + (0.95 if columns > 1 else 0.72) * rows, title, COUNTERPART)
+    figure, down = new_sheet(
+        DOUBLE,
+        (1.24 if columns > 1 else 1.3) + (0.95 if columns > 1 else 0.72) * rows,
+        title,
+        COUNTERPART,
+    )
     axes = panels(figure, down + 0.2, rows, columns, sharex=True, sharey=True)
-    for panel, row, letter in zip(axes.flat, np.concatenate([real, generated])[order], LETTERS, strict=False):
+    for panel, row, letter in zip(
+        axes.flat, np.concatenate([real, generated])[order], LETTERS, strict=False
+    ):
         panel.plot(minutes, row, color=REAL, linewidth=0.5)
         panel.set_title(letter, weight="bold")
     name_axes(axes, FACTS)
-    answer = ", ".join(letter for letter, made in zip(LETTERS, is_generated[order], strict=False) if made)
+    answer = ", ".join(
+        letter for letter, made in zip(LETTERS, is_generated[order], strict=False) if made
+    )
     width, height = figure.get_size_inches()
     for text, y in ((f"generated: {answer}", FOOT + 0.04), (hint, EDGE)):
-        figure.text(1 - EDGE / width, y / height, text, size=7, color=QUIET, rotation=180, ha="right")
+        figure.text(
+            1 - EDGE / width, y / height, text, size=7, color=QUIET, rotation=180, ha="right"
+        )
     return figure
 
 
@@ -150,16 +188,30 @@ def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Eight windows of telemetry in random order; four are generated."""
     rng, real = pipeline.draw("figure 5"), sample(pipeline, "test", 4, "figure 5, real")
     generated = pipeline.combine(pipeline.windows("test", 4, "figure 5, generated")["coarse"], rng)
-    return guess("Which windows of telemetry are generated?", real["minutes"], real["target"], generated, rng)
+    return guess(
+        "Which windows of telemetry are generated?", real["minutes"], real["target"], generated, rng
+    )
 
 
-@paper_figure("fig06_real_or_generated_noise", "Real or generated: windows of noise (a counterpart)")
+@paper_figure(
+    "fig06_real_or_generated_noise", "Real or generated: windows of noise (a counterpart)"
+)
 def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Eight windows of noise in random order; four are generated."""
     rng, found = pipeline.draw("figure 6"), noise_resemblance(pipeline)
-    real, minutes = pipeline.noise_windows("test", 4, "figure 6, real"), sample(pipeline, "test", 1, "figure 6")["minutes"]
+    real, minutes = (
+        pipeline.noise_windows("test", 4, "figure 6, real"),
+        sample(pipeline, "test", 1, "figure 6")["minutes"],
+    )
     hint = f"effective rank: generated {found['rank']:.0f}, real {found['real_rank']:.0f}"
-    return guess("Which windows of noise are generated?", minutes, real, pipeline.generate_noise(4, rng), rng, hint)
+    return guess(
+        "Which windows of noise are generated?",
+        minutes,
+        real,
+        pipeline.generate_noise(4, rng),
+        rng,
+        hint,
+    )
 
 
 @paper_figure("fig07_real_or_generated_series", "Real or generated: longer series (a counterpart)")
@@ -168,11 +220,22 @@ def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
     rng, size = pipeline.draw("figure 7"), pipeline.settings.window
     series = pipeline.parts["test"]
     number = min(4, len(series.values) // size)
-    starts = rng.integers(0, len(series.values) - number * size + 1, 4)[:, None] + np.arange(number * size)
+    starts = rng.integers(0, len(series.values) - number * size + 1, 4)[:, None] + np.arange(
+        number * size
+    )
     noise = pipeline.generate_noise(2 * number, rng).reshape(2, -1)
-    clean = pipeline.enhance(pipeline.simulator(series.time[starts[2:]]).astype(np.float32).reshape(-1, size)).reshape(2, -1)
+    clean = pipeline.enhance(
+        pipeline.simulator(series.time[starts[2:]]).astype(np.float32).reshape(-1, size)
+    ).reshape(2, -1)
     minutes = series.interval / 60 * np.arange(number * size)
-    return guess("Which longer series are generated?", minutes, series.values[starts[:2]], clean + noise, rng, columns=1)
+    return guess(
+        "Which longer series are generated?",
+        minutes,
+        series.values[starts[:2]],
+        clean + noise,
+        rng,
+        columns=1,
+    )
 
 
 @paper_figure("fig08_source_noise", "Extracted source noise")
@@ -180,10 +243,22 @@ def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Above a window of telemetry with its moving average, below the noise that remains."""
     settings, window = pipeline.settings, sample(pipeline, "test", 1, "figure 8")
     series, start = pipeline.parts["test"].values, int(window["start"][0])
-    before = settings.moving_average // 2 if settings.average == "centred" else settings.moving_average - 1
+    before = (
+        settings.moving_average // 2
+        if settings.average == "centred"
+        else settings.moving_average - 1
+    )
     begin = min(max(start, before), len(series) - settings.window - before)
-    noise, average = extract_noise(series[begin - before : begin + settings.window + before], settings.moving_average, settings.average)
-    noise, average, shown = noise[: settings.window], average[: settings.window], series[begin : begin + settings.window]
+    noise, average = extract_noise(
+        series[begin - before : begin + settings.window + before],
+        settings.moving_average,
+        settings.average,
+    )
+    noise, average, shown = (
+        noise[: settings.window],
+        average[: settings.window],
+        series[begin : begin + settings.window],
+    )
     figure, down = new_sheet(
         DOUBLE,
         3.0,
@@ -210,7 +285,9 @@ def generator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
 @paper_figure("fig10_discriminator", "Discriminator construction")
 def discriminator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Table of the discriminator's layers with their output shapes and numbers of parameters."""
-    return layer_table(build_discriminator(pipeline.settings), "A window is narrowed to one probability")
+    return layer_table(
+        build_discriminator(pipeline.settings), "A window is narrowed to one probability"
+    )
 
 
 @paper_figure("fig11_gan_training", "GAN training")
@@ -239,14 +316,20 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     ):
         panel.axhline(chance, color=LINE, linestyle=":", linewidth=1)
         lines = {name: history[f"{key}_{name}"][chosen] for name in ("real", "generated")}
-        panel.plot(history["iteration"][chosen], lines["real"], color=REAL, marker="o", markersize=3.5)
+        panel.plot(
+            history["iteration"][chosen], lines["real"], color=REAL, marker="o", markersize=3.5
+        )
         style = {"linestyle": DASHED, "marker": "s", "markersize": 3.5, "markerfacecolor": "white"}
         panel.plot(history["iteration"][chosen], lines["generated"], color=GENERATED, **style)
-        panel.set_ylim(0, 1.02 if key == "accuracy" else max(1.02, 1.05 * np.max(list(lines.values()))))
+        panel.set_ylim(
+            0, 1.02 if key == "accuracy" else max(1.02, 1.05 * np.max(list(lines.values())))
+        )
         panel.margins(x=0.03)
         panel.set(xlabel="iteration", ylabel=words)
         panel.xaxis.set_major_formatter("{x:,.0f}")
-        label_ends(panel, {"real": (lines["real"], REAL), "generated": (lines["generated"], GENERATED)})
+        label_ends(
+            panel, {"real": (lines["real"], REAL), "generated": (lines["generated"], GENERATED)}
+        )
     return figure
 
 
@@ -261,7 +344,9 @@ def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
         SINGLE,
         3.5,
         "Generated noise roughens the enhanced signal",
-        "Standard deviation of first differences here: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(*rough),
+        "Standard deviation of first differences here: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(
+            *rough
+        ),
     )
     axes = panels(figure, down + 0.2, 3, 1, sharex=True, sharey=True)
     axes[0, 0].plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
@@ -288,10 +373,17 @@ def stored_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
         f"“{telemetry.name}”: {len(telemetry.values):,} samples, one every {telemetry.interval:g} s; the first {len(shown.values):,}.",
     )
     panel = panels(figure, down + 0.1, 1, 1)[0, 0]
-    panel.plot(start + np.round(1e3 * shown.time).astype("timedelta64[ms]"), shown.values, color=REAL, linewidth=0.4)
+    panel.plot(
+        start + np.round(1e3 * shown.time).astype("timedelta64[ms]"),
+        shown.values,
+        color=REAL,
+        linewidth=0.4,
+    )
     locator = matplotlib.dates.AutoDateLocator()
     panel.xaxis.set_major_locator(locator)
-    panel.xaxis.set_major_formatter(matplotlib.dates.ConciseDateFormatter(locator, show_offset=False))
+    panel.xaxis.set_major_formatter(
+        matplotlib.dates.ConciseDateFormatter(locator, show_offset=False)
+    )
     name_axes(np.array([[panel]]), FACTS | {"time_unit": f"UTC, from {str(start)[:10]}"})
     return figure
 
@@ -305,7 +397,9 @@ def layer_table(network: keras.Sequential, title: str) -> matplotlib.figure.Figu
     y = height - down - 0.2
 
     def row(y: float, cells: Sequence[str], **style: object) -> None:
-        for x, cell, side in zip((EDGE, 1.72, SINGLE - EDGE), cells, ("left", "left", "right"), strict=True):
+        for x, cell, side in zip(
+            (EDGE, 1.72, SINGLE - EDGE), cells, ("left", "left", "right"), strict=True
+        ):
             axes.text(x, y, cell, ha=side, **style)
 
     def rule(y: float, linewidth: float) -> None:
@@ -318,11 +412,24 @@ def layer_table(network: keras.Sequential, title: str) -> matplotlib.figure.Figu
         y -= 0.3 if layer is not network.layers[0] else 0.24
         kind = type(layer).__name__
         is_named = layer.name.startswith(("Input", "Hidden", "Output"))
-        row(y, (f"{layer.name} ({kind})" if is_named else kind, str(tuple(layer.output.shape)), f"{layer.count_params():,}"), size=8)
+        row(
+            y,
+            (
+                f"{layer.name} ({kind})" if is_named else kind,
+                str(tuple(layer.output.shape)),
+                f"{layer.count_params():,}",
+            ),
+            size=8,
+        )
         axes.text(EDGE, y - 0.125, layer_details(layer), size=7, color=QUIET)
     y -= 0.36
     rule(y + 0.12, 0.5)
-    row(y - 0.04, (f"Total, input {network.input_shape}", "", f"{network.count_params():,}"), size=8, weight="bold")
+    row(
+        y - 0.04,
+        (f"Total, input {network.input_shape}", "", f"{network.count_params():,}"),
+        size=8,
+        weight="bold",
+    )
     rule(y - 0.14, 1.0)
     return figure
 
@@ -332,12 +439,16 @@ def layer_details(layer: keras.layers.Layer) -> str:
     config = layer.get_config()
     names = {"filters": "filters", "kernel_size": "window", "strides": "stride", "rate": "rate"}
     words = [
-        f"{word} {config[key][0] if isinstance(config[key], tuple | list) else config[key]}" for key, word in names.items() if key in config
+        f"{word} {config[key][0] if isinstance(config[key], tuple | list) else config[key]}"
+        for key, word in names.items()
+        if key in config
     ]
     return ", ".join([*words, *([config["activation"]] if config.get("activation") else [])])
 
 
-def save_figure(name: str, pipeline: Pipeline, folder: Path, caption: str, is_smoke: bool = False) -> None:
+def save_figure(
+    name: str, pipeline: Pipeline, folder: Path, caption: str, is_smoke: bool = False
+) -> None:
     """Writes one of `FIGURES` as PNG and SVG: copies a kept drawing, or draws it; see `common.figure.save`."""
     drawings = list(DRAWINGS.glob(f"{name}.*"))
     if not drawings:

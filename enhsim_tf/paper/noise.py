@@ -17,7 +17,9 @@ REAL, GENERATED = 1.0, 0.0
 """Labels: "Real data has a tag of 1.0, while generated data has a tag of 0.0." """
 
 
-def extract_noise(values: np.ndarray, width: int, average: str = "centred") -> tuple[np.ndarray, np.ndarray]:
+def extract_noise(
+    values: np.ndarray, width: int, average: str = "centred"
+) -> tuple[np.ndarray, np.ndarray]:
     """Step 6: the noise of a series, which is the series minus its moving average.
 
     "This average is subtracted from the original signal, leaving the noise." The paper cites the rolling mean of pandas. Samples
@@ -46,13 +48,18 @@ def build_generator(settings: Settings) -> keras.Sequential:
     Returns:
         A network from `(rows, 16)` to `(rows, window, 1)`.
     """
-    first, last = initialiser(settings, "he_uniform", 100), initialiser(settings, "glorot_uniform", 101)
+    first, last = (
+        initialiser(settings, "he_uniform", 100),
+        initialiser(settings, "glorot_uniform", 101),
+    )
     return keras.Sequential(
         [
             keras.Input((settings.latent,)),
             keras.layers.Dense(settings.generator_units, "relu", kernel_initializer=first),
             keras.layers.BatchNormalization(),
-            keras.layers.Dense(settings.window, settings.generator_activation, kernel_initializer=last),
+            keras.layers.Dense(
+                settings.window, settings.generator_activation, kernel_initializer=last
+            ),
             keras.layers.Reshape((settings.window, 1)),
         ],
         name="generator",
@@ -71,14 +78,24 @@ def build_discriminator(settings: Settings) -> keras.Sequential:
         A network from `(rows, window, 1)` to `(rows, 1)`, the probability that a row is real.
     """
     kernels = [
-        initialiser(settings, name, number) for number, name in ((200, "glorot_uniform"), (201, "he_uniform"), (202, "glorot_uniform"))
+        initialiser(settings, name, number)
+        for number, name in ((200, "glorot_uniform"), (201, "he_uniform"), (202, "glorot_uniform"))
     ]
-    dropouts = [[keras.layers.Dropout(settings.dropout, seed=1_000 * settings.seed + number)] for number in (300, 301)]
+    dropouts = [
+        [keras.layers.Dropout(settings.dropout, seed=1_000 * settings.seed + number)]
+        for number in (300, 301)
+    ]
     after_convolution, after_narrow = dropouts if settings.dropout else ([], [])
     return keras.Sequential(
         [
             keras.Input((settings.window, 1)),
-            keras.layers.Conv1D(settings.filters, settings.filter_width, settings.stride, activation="relu", kernel_initializer=kernels[0]),
+            keras.layers.Conv1D(
+                settings.filters,
+                settings.filter_width,
+                settings.stride,
+                activation="relu",
+                kernel_initializer=kernels[0],
+            ),
             *after_convolution,
             keras.layers.GlobalMaxPooling1D(),
             keras.layers.Dense(settings.narrow_units, "relu", kernel_initializer=kernels[1]),
@@ -105,21 +122,32 @@ class NoiseGAN(keras.Model):
     def __init__(self, generator: keras.Model, discriminator: keras.Model, settings: Settings):
         super().__init__(name="noise_gan")
         self.settings, self.generator = settings, generator
-        self.discriminator = with_fast_convolution(discriminator) if settings.fast else discriminator
+        self.discriminator = (
+            with_fast_convolution(discriminator) if settings.fast else discriminator
+        )
         self.discriminator_weights = list(self.discriminator.trainable_variables)
         self.discriminator.trainable = False
         self.combined = keras.Sequential([generator, self.discriminator], name="combined")
         self.seeds = keras.random.SeedGenerator(settings.seed)  # of all draws in training
         self.trackers = {
             name: keras.metrics.Mean(name)
-            for name in ("discriminator_loss", "generator_loss", "accuracy_real", "accuracy_generated", "loss_real", "loss_generated")
+            for name in (
+                "discriminator_loss",
+                "generator_loss",
+                "accuracy_real",
+                "accuracy_generated",
+                "loss_real",
+                "loss_generated",
+            )
         }
 
     def compile(self) -> None:
         """Sets the loss, binary cross-entropy, and an Adam optimizer for each network."""
         super().compile(optimizer=None, jit_compile=False)
         adam = fused_adam if self.settings.fast else keras.optimizers.Adam
-        self.discriminator_adam, self.generator_adam = (adam(self.settings.gan_learning_rate) for _ in range(2))
+        self.discriminator_adam, self.generator_adam = (
+            adam(self.settings.gan_learning_rate) for _ in range(2)
+        )
         self.loss_function = keras.losses.BinaryCrossentropy()
 
     @property
@@ -148,13 +176,17 @@ class NoiseGAN(keras.Model):
 
         # "the discriminator's weights are frozen, and the generator is trained as part of the entire GAN model"
         self.train_generator()
-        return {name: self.trackers[name].result() for name in ("discriminator_loss", "generator_loss")}
+        return {
+            name: self.trackers[name].result() for name in ("discriminator_loss", "generator_loss")
+        }
 
     def train_discriminator(self, rows: tf.Tensor, tags: tf.Tensor) -> None:
         """Updates the discriminator's weights, and no others."""
         with tf.GradientTape() as tape:
             loss = self.loss_function(tags, self.discriminator(rows, training=True))
-        self.discriminator_adam.apply(tape.gradient(loss, self.discriminator_weights), self.discriminator_weights)
+        self.discriminator_adam.apply(
+            tape.gradient(loss, self.discriminator_weights), self.discriminator_weights
+        )
         self.trackers["discriminator_loss"].update_state(loss)
 
     def train_generator(self) -> None:
@@ -164,7 +196,9 @@ class NoiseGAN(keras.Model):
         """
         latent = self.draw_latent(self.settings.rows)
         with tf.GradientTape() as tape:
-            loss = self.loss_function(labels(self.settings.rows, REAL), self.combined(latent, training=True))
+            loss = self.loss_function(
+                labels(self.settings.rows, REAL), self.combined(latent, training=True)
+            )
         weights = self.combined.trainable_variables
         self.generator_adam.apply(tape.gradient(loss, weights), weights)
         self.trackers["generator_loss"].update_state(loss)
@@ -178,14 +212,20 @@ class NoiseGAN(keras.Model):
         for kind, rows, tag in (("real", real, REAL), ("generated", generated, GENERATED)):
             predicted = self.discriminator(rows, training=False)
             tags = labels(number, tag)
-            self.trackers[f"accuracy_{kind}"].update_state(keras.metrics.binary_accuracy(tags, predicted))
+            self.trackers[f"accuracy_{kind}"].update_state(
+                keras.metrics.binary_accuracy(tags, predicted)
+            )
             self.trackers[f"loss_{kind}"].update_state(self.loss_function(tags, predicted))
-            measured |= {name: self.trackers[name].result() for name in (f"accuracy_{kind}", f"loss_{kind}")}
+            measured |= {
+                name: self.trackers[name].result() for name in (f"accuracy_{kind}", f"loss_{kind}")
+            }
         return measured
 
     def draw_latent(self, number: int) -> tf.Tensor:
         """Step 7: latent vectors, normally distributed, shape `(number, latent)`."""
-        return self.settings.latent_scale * keras.random.normal((number, self.settings.latent), seed=self.seeds)
+        return self.settings.latent_scale * keras.random.normal(
+            (number, self.settings.latent), seed=self.seeds
+        )
 
 
 def labels(number: int, tag: float) -> tf.Tensor:
@@ -208,7 +248,11 @@ class Rows(keras.utils.PyDataset):
 
 
 def train_gan(
-    gan: NoiseGAN, noise: np.ndarray, first: int, last: int, on_record: Callable[[int], None] = lambda iteration: None
+    gan: NoiseGAN,
+    noise: np.ndarray,
+    first: int,
+    last: int,
+    on_record: Callable[[int], None] = lambda iteration: None,
 ) -> dict[str, list[float]]:
     """Step 8: trains the GAN "to create realistic environment influence", "sampled at 100-step intervals".
 
@@ -231,14 +275,20 @@ def train_gan(
         epochs=last // every,
         initial_epoch=first // every,
         validation_data=Rows(noise, settings.rows, 1, samples),
-        callbacks=[keras.callbacks.LambdaCallback(on_epoch_end=lambda epoch, logs: on_record((epoch + 1) * every))],
+        callbacks=[
+            keras.callbacks.LambdaCallback(
+                on_epoch_end=lambda epoch, logs: on_record((epoch + 1) * every)
+            )
+        ],
         shuffle=False,
         verbose=0,
     )
     return {name.removeprefix("val_"): values for name, values in history.history.items()}
 
 
-def generate_noise(generator: keras.Model, number: int, settings: Settings, rng: np.random.Generator) -> np.ndarray:
+def generate_noise(
+    generator: keras.Model, number: int, settings: Settings, rng: np.random.Generator
+) -> np.ndarray:
     """Step 9: generates "environmental influences", float32 of shape `(number, window)`; `rng` draws the latent vectors."""
     latent = settings.latent_scale * rng.standard_normal((number, settings.latent), np.float32)
     return predict(generator, latent)[:, :, 0]

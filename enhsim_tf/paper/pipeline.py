@@ -85,7 +85,9 @@ class Pipeline:
 
     # -- 2: generate approximate data ----------------------------------------------------------------------------------
 
-    def windows(self, part: str, number: int | None = None, purpose: str = "") -> dict[str, np.ndarray]:
+    def windows(
+        self, part: str, number: int | None = None, purpose: str = ""
+    ) -> dict[str, np.ndarray]:
         """Windows of telemetry and the simulation of the same times.
 
         Args:
@@ -99,8 +101,12 @@ class Pipeline:
         """
         series, size = self.parts[part], self.settings.window
         starts = self._starts(len(series.values), number, purpose)
-        times, target = (cut_windows(values, starts, size) for values in (series.time, series.values))
-        coarse, truth = (signal(times).astype(np.float32) for signal in (self.simulator, self.truth))
+        times, target = (
+            cut_windows(values, starts, size) for values in (series.time, series.values)
+        )
+        coarse, truth = (
+            signal(times).astype(np.float32) for signal in (self.simulator, self.truth)
+        )
         return {"coarse": coarse, "target": target, "truth": truth, "start": starts}
 
     def _starts(self, num_samples: int, number: int | None, purpose: str) -> np.ndarray:
@@ -119,11 +125,18 @@ class Pipeline:
 
     def _train_enhancer(self, folder: Path) -> None:
         train = self.windows("train", self.settings.num_windows, "training windows")
-        held_out = self.windows("test", min(200, self.settings.num_windows), "validation windows")  # by which nothing is chosen
+        held_out = self.windows(
+            "test", min(200, self.settings.num_windows), "validation windows"
+        )  # by which nothing is chosen
         told = self.stages.progress.loop("epoch", self.settings.epochs)
         watch = keras.callbacks.LambdaCallback(on_epoch_end=lambda epoch, logs: told(epoch + 1))
-        network, validation = build_enhancer(self.settings), (held_out["coarse"], held_out["target"])
-        history = train_enhancer(network, train["coarse"], train["target"], self.settings, validation, [watch])
+        network, validation = (
+            build_enhancer(self.settings),
+            (held_out["coarse"], held_out["target"]),
+        )
+        history = train_enhancer(
+            network, train["coarse"], train["target"], self.settings, validation, [watch]
+        )
         network.save_weights(folder / "enhancer.weights.h5")
         save_arrays(folder, history)
 
@@ -142,8 +155,12 @@ class Pipeline:
 
     def noise_windows(self, part: str, number: int | None = None, purpose: str = "") -> np.ndarray:
         """Windows of the noise of a part; the arguments are those of `windows`."""
-        extracted, _ = noise.extract_noise(self.parts[part].values, self.settings.moving_average, self.settings.average)
-        return cut_windows(extracted, self._starts(len(extracted), number, purpose), self.settings.window)
+        extracted, _ = noise.extract_noise(
+            self.parts[part].values, self.settings.moving_average, self.settings.average
+        )
+        return cut_windows(
+            extracted, self._starts(len(extracted), number, purpose), self.settings.window
+        )
 
     # -- 7 and 8: latent space; train generative adversarial model (GAN) -----------------------------------------------
 
@@ -163,19 +180,32 @@ class Pipeline:
         told = self.stages.progress.loop("iteration", chosen.rounds * chosen.iterations)
 
         def follow(iteration: int) -> None:
-            generated = noise.generate_noise(networks[0], FOLLOWED, chosen, self.draw("followed noise"))
-            followed.append({"iteration": iteration, "sd": np.std(generated), "lag_one": autocorrelation(generated, 1)[1]})
+            generated = noise.generate_noise(
+                networks[0], FOLLOWED, chosen, self.draw("followed noise")
+            )
+            followed.append(
+                {
+                    "iteration": iteration,
+                    "sd": np.std(generated),
+                    "lag_one": autocorrelation(generated, 1)[1],
+                }
+            )
             told(iteration)
 
         history: dict[str, list[float]] = {}
         for done in range(chosen.rounds):
-            found = noise.train_gan(gan, real, done * chosen.iterations, (done + 1) * chosen.iterations, follow)
+            found = noise.train_gan(
+                gan, real, done * chosen.iterations, (done + 1) * chosen.iterations, follow
+            )
             history = {name: history.get(name, []) + values for name, values in found.items()}
             if not done:
                 for network in networks:
                     network.save_weights(folder / f"{network.name}.weights.h5")
         rows = {name: [row[name] for row in followed] for name in followed[0]}
-        save_arrays(folder, history | rows | {"real_sd": np.std(real), "real_lag_one": autocorrelation(real, 1)[1]})
+        save_arrays(
+            folder,
+            history | rows | {"real_sd": np.std(real), "real_lag_one": autocorrelation(real, 1)[1]},
+        )
 
     @functools.cached_property
     def history(self) -> dict[str, np.ndarray]:

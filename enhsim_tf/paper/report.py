@@ -21,7 +21,13 @@ from enhsim_tf.paper.settings import Settings
 
 PUBLISHED = Path(__file__).with_name("published.json")
 UNDECIDED = "undecided"
-_KINDS = {REPRODUCED: "good", PARTLY: "half", NOT_REPRODUCED: "bad", UNDECIDED: "open", NOT_MEASURED: "none"}  # classes of the style sheet
+_KINDS = {
+    REPRODUCED: "good",
+    PARTLY: "half",
+    NOT_REPRODUCED: "bad",
+    UNDECIDED: "open",
+    NOT_MEASURED: "none",
+}  # classes of the style sheet
 _KINDS |= {words: _KINDS[verdict] for verdict, words in OF_UNTESTED.items()}
 
 
@@ -37,13 +43,21 @@ def read_published() -> dict[str, Any]:
 
 def short(value: float) -> str:
     """A number with three significant digits; more if it would be rounded up to 1."""
-    return f"{value:,.0f}" if abs(value) >= 1_000 else f"{value:.5f}" if 0.9995 <= value < 1 else f"{value:.3g}"
+    return (
+        f"{value:,.0f}"
+        if abs(value) >= 1_000
+        else f"{value:.5f}"
+        if 0.9995 <= value < 1
+        else f"{value:.3g}"
+    )
 
 
 def needed(limit: Mapping[str, Any]) -> str:
     """The range of a limit."""
     low, high = (None if limit[end] is None else short(limit[end]) for end in ("low", "high"))
-    return f"from {low} to {high}" if low and high else f"at least {low}" if low else f"at most {high}"
+    return (
+        f"from {low} to {high}" if low and high else f"at least {low}" if low else f"at most {high}"
+    )
 
 
 def box(records: Sequence[Mapping[str, Any]], published: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -56,7 +70,9 @@ def box(records: Sequence[Mapping[str, Any]], published: Mapping[str, Any]) -> l
                 "claim": f"{record['id']} {record['short']}",
                 "published": f"{known['verdict']} ({'/'.join(map(str, known['runs']))})",
                 "this run": record["verdict"],
-                "because": f"{limit['words']}: {short(limit['value'])}, needed {needed(limit)}" if limit else "",
+                "because": f"{limit['words']}: {short(limit['value'])}, needed {needed(limit)}"
+                if limit
+                else "",
             }
         )
     return rows
@@ -65,7 +81,10 @@ def box(records: Sequence[Mapping[str, Any]], published: Mapping[str, Any]) -> l
 def as_text(rows: Sequence[Mapping[str, str]]) -> str:
     """A table for the terminal."""
     widths = {name: max(len(name), *(len(row[name]) for row in rows)) for name in rows[0]}
-    lines = [[name.ljust(width) for name, width in widths.items()], ["-" * width for width in widths.values()]]
+    lines = [
+        [name.ljust(width) for name, width in widths.items()],
+        ["-" * width for width in widths.values()],
+    ]
     lines += [[row[name].ljust(width) for name, width in widths.items()] for row in rows]
     return "\n".join("  ".join(line).rstrip() for line in lines)
 
@@ -75,7 +94,13 @@ def decisions(settings: Settings | None = None) -> list[Mapping[str, str]]:
     settings, rows = settings or Settings(), []
     for field in dataclasses.fields(Settings):
         about, value = field.metadata, getattr(settings, field.name)
-        number = {True: "yes", False: "no"}[value] if isinstance(value, bool) else value if isinstance(value, str) else f"{value:,g}"
+        number = (
+            {True: "yes", False: "no"}[value]
+            if isinstance(value, bool)
+            else value
+            if isinstance(value, str)
+            else f"{value:,g}"
+        )
         if isinstance(value, int) and not isinstance(value, bool):
             number = f"{value:,}"
         words = {key: about[key] for key in ("paper", "author", "source", "why")}
@@ -84,7 +109,11 @@ def decisions(settings: Settings | None = None) -> list[Mapping[str, str]]:
 
 
 def results(
-    records: Sequence[Mapping[str, Any]], title: str, settings: Settings, published: Mapping[str, Any], **about: Any
+    records: Sequence[Mapping[str, Any]],
+    title: str,
+    settings: Settings,
+    published: Mapping[str, Any],
+    **about: Any,
 ) -> dict[str, Any]:
     """The content of `results.json`.
 
@@ -110,9 +139,18 @@ def results(
 def write_page(folder: Path, found: Mapping[str, Any], settings: Settings) -> Path:
     """Writes `report.html` into the folder of the figures, from the content of `results.json`. It loads nothing and runs no script."""
     loader = jinja2.FileSystemLoader(Path(__file__).parent)
-    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = jinja2.Environment(
+        loader=loader,
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     environment.filters |= {"short": short, "needed": needed, "kind": _KINDS.get}
-    pictures, rows = [_picture(folder, name, found["claims"]) for name in FIGURES], decisions(settings)
+    pictures, rows = (
+        [_picture(folder, name, found["claims"]) for name in FIGURES],
+        decisions(settings),
+    )
     text = environment.get_template("report.html.jinja").render(
         found=found,
         pictures=pictures,
@@ -130,7 +168,9 @@ def write_page(folder: Path, found: Mapping[str, Any], settings: Settings) -> Pa
 
 def _picture(folder: Path, name: str, records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     png = (folder / f"{name}.png").read_bytes()
-    width, height = (int.from_bytes(png[at : at + 4], "big") for at in (16, 20))  # where a PNG keeps them
+    width, height = (
+        int.from_bytes(png[at : at + 4], "big") for at in (16, 20)
+    )  # where a PNG keeps them
     svg = f"data:image/svg+xml;base64,{base64.b64encode((folder / f'{name}.svg').read_bytes()).decode()}"
     about = {key: getattr(FIGURES[name], key) for key in ("number", "title", "alt")}
     shown_by = [record for record in records if record["figure"] == name]

@@ -48,8 +48,16 @@ def setting(
         choices: Values of a setting that is a word. The first one is the reference, the others are further readings.
         smoke: The value at the smoke budget, if it differs.
     """
-    about = {"stages": tuple(stages.split(", ")), "source": source, "why": why, "paper": paper, "author": author}
-    return dataclasses.field(default=value, metadata=about | {"unit": unit, "choices": choices, "smoke": smoke})
+    about = {
+        "stages": tuple(stages.split(", ")),
+        "source": source,
+        "why": why,
+        "paper": paper,
+        "author": author,
+    }
+    return dataclasses.field(
+        default=value, metadata=about | {"unit": unit, "choices": choices, "smoke": smoke}
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,59 +69,222 @@ class Settings:
     # section 2: the telemetry
     orbit_period: float = setting(480.0, "telemetry", PAPER, "section 2", "8 minutes", unit="s")
     rotation_period: float = setting(120.0, "telemetry", PAPER, "section 2", "2 minutes", unit="s")
-    orbit_amplitude: float = setting(0.5, "telemetry", AUTHOR, GAN_CODE, author="real data have amplitude 0.5 under a tanh")
-    rotation_amplitude: float = setting(0.25, "telemetry", OURS, "half the orbit's amplitude, so that both waves of the sum are visible")
-    noise_sd: float = setting(0.1, "telemetry", OURS, "Gaussian; small beside the waves and still visible", author="0.1 in a comment")
-    interval: float = setting(1.0, "telemetry", OURS, "500 samples then last slightly more than one orbit", unit="s")
-    num_samples: int = setting(2_073_600, "telemetry", OURS, "24 days: 1,000 disjoint test windows", unit="samples", smoke=120_000)
-    window: int = setting(500, "windows", PAPER, "section 2.3", '"the number of samples in the time series"', "100", unit="samples")
+    orbit_amplitude: float = setting(
+        0.5, "telemetry", AUTHOR, GAN_CODE, author="real data have amplitude 0.5 under a tanh"
+    )
+    rotation_amplitude: float = setting(
+        0.25,
+        "telemetry",
+        OURS,
+        "half the orbit's amplitude, so that both waves of the sum are visible",
+    )
+    noise_sd: float = setting(
+        0.1,
+        "telemetry",
+        OURS,
+        "Gaussian; small beside the waves and still visible",
+        author="0.1 in a comment",
+    )
+    interval: float = setting(
+        1.0, "telemetry", OURS, "500 samples then last slightly more than one orbit", unit="s"
+    )
+    num_samples: int = setting(
+        2_073_600,
+        "telemetry",
+        OURS,
+        "24 days: 1,000 disjoint test windows",
+        unit="samples",
+        smoke=120_000,
+    )
+    window: int = setting(
+        500,
+        "windows",
+        PAPER,
+        "section 2.3",
+        '"the number of samples in the time series"',
+        "100",
+        unit="samples",
+    )
 
     # section 2.2: the enhancer
-    num_windows: int = setting(1_500, "windows", OURS, "15,000 is a reading", '"a large number"', "10 to 3,000", unit="windows", smoke=60)
-    hidden_units: int = setting(3_200, "enhancer", PAPER, "section 2.2", "3,200", "200", unit="units")
-    num_hidden: int = setting(2, "enhancer", PAPER, "section 2.2: Hidden_1 and Hidden_2 between input and output", "2", "1", unit="layers")
-    epochs: int = setting(40, "enhancer", PAPER, "section 2.2", "40", "10 to 100", unit="epochs", smoke=2)
+    num_windows: int = setting(
+        1_500,
+        "windows",
+        OURS,
+        "15,000 is a reading",
+        '"a large number"',
+        "10 to 3,000",
+        unit="windows",
+        smoke=60,
+    )
+    hidden_units: int = setting(
+        3_200, "enhancer", PAPER, "section 2.2", "3,200", "200", unit="units"
+    )
+    num_hidden: int = setting(
+        2,
+        "enhancer",
+        PAPER,
+        "section 2.2: Hidden_1 and Hidden_2 between input and output",
+        "2",
+        "1",
+        unit="layers",
+    )
+    epochs: int = setting(
+        40, "enhancer", PAPER, "section 2.2", "40", "10 to 100", unit="epochs", smoke=2
+    )
     batch_size: int = setting(15, "enhancer", PAPER, "section 2.2", "15", "2 to 20", unit="windows")
-    learning_rate: float = setting(0.001, "enhancer", OURS, LEARNING_RATE, author="0.01, for 200 units")
-    loss: str = setting("mean_squared_error", "enhancer", AUTHOR, MLP_CODE, "", "mean squared error")
+    learning_rate: float = setting(
+        0.001, "enhancer", OURS, LEARNING_RATE, author="0.01, for 200 units"
+    )
+    loss: str = setting(
+        "mean_squared_error", "enhancer", AUTHOR, MLP_CODE, "", "mean squared error"
+    )
     initialisers: str = setting(
-        "by layer", "enhancer, noise GAN", AUTHOR, f"{GAN_CODE} and {MLP_CODE}", author=INITIALISERS, choices=("by layer", "he_uniform")
+        "by layer",
+        "enhancer, noise GAN",
+        AUTHOR,
+        f"{GAN_CODE} and {MLP_CODE}",
+        author=INITIALISERS,
+        choices=("by layer", "he_uniform"),
     )
 
     # section 2.3: the noise and its GAN
-    moving_average: int = setting(25, "noise", OURS, "short beside 2 minutes; edges are cut", "pandas' rolling mean", unit="samples")
-    average: str = setting("centred", "noise", OURS, AVERAGE, "pandas' rolling mean", choices=("centred", "trailing"))
+    moving_average: int = setting(
+        25,
+        "noise",
+        OURS,
+        "short beside 2 minutes; edges are cut",
+        "pandas' rolling mean",
+        unit="samples",
+    )
+    average: str = setting(
+        "centred", "noise", OURS, AVERAGE, "pandas' rolling mean", choices=("centred", "trailing")
+    )
     latent: int = setting(16, "noise GAN", PAPER, "section 2.3", "16", "16", unit="elements")
-    latent_scale: float = setting(1.0, "noise GAN", OURS, "a standard normal draw; 4 and 2 pi are readings", author=SPAN)
+    latent_scale: float = setting(
+        1.0, "noise GAN", OURS, "a standard normal draw; 4 and 2 pi are readings", author=SPAN
+    )
     generator_units: int = setting(64, "noise GAN", PAPER, "section 2.3", "64", "64", unit="units")
     generator_activation: str = setting("tanh", "noise GAN", AUTHOR, GAN_CODE, "", "tanh")
-    filters: int = setting(500, "noise GAN", AUTHOR, FILTERS, '"merges input from 4 rows"', "the window's length", unit="filters")
-    filter_width: int = setting(20, "noise GAN", PAPER, "section 2.3", '"a window 20 neurons wide"', "20", unit="samples")
-    stride: int = setting(4, "noise GAN", PAPER, "section 2.3", '"a stride of 4 neurons"', "4", unit="samples")
-    narrow_units: int = setting(25, "noise GAN", AUTHOR, GAN_CODE, '"progressively narrowed"', "25, or half the window", unit="units")
-    dropout: float = setting(0.3, "noise GAN", AUTHOR, GAN_CODE, author="0.3 after the convolution and after the narrow layer")
-    rows: int = setting(200, "noise GAN", PAPER, "section 2.3", '"the entire batch (200 rows)"', "one number for all", unit="rows")
-    update: str = setting("mixed 100 + 100", "noise GAN", PAPER, "section 2.3", UPDATE, "two updates, real then generated", choices=UPDATES)
+    filters: int = setting(
+        500,
+        "noise GAN",
+        AUTHOR,
+        FILTERS,
+        '"merges input from 4 rows"',
+        "the window's length",
+        unit="filters",
+    )
+    filter_width: int = setting(
+        20, "noise GAN", PAPER, "section 2.3", '"a window 20 neurons wide"', "20", unit="samples"
+    )
+    stride: int = setting(
+        4, "noise GAN", PAPER, "section 2.3", '"a stride of 4 neurons"', "4", unit="samples"
+    )
+    narrow_units: int = setting(
+        25,
+        "noise GAN",
+        AUTHOR,
+        GAN_CODE,
+        '"progressively narrowed"',
+        "25, or half the window",
+        unit="units",
+    )
+    dropout: float = setting(
+        0.3,
+        "noise GAN",
+        AUTHOR,
+        GAN_CODE,
+        author="0.3 after the convolution and after the narrow layer",
+    )
+    rows: int = setting(
+        200,
+        "noise GAN",
+        PAPER,
+        "section 2.3",
+        '"the entire batch (200 rows)"',
+        "one number for all",
+        unit="rows",
+    )
+    update: str = setting(
+        "mixed 100 + 100",
+        "noise GAN",
+        PAPER,
+        "section 2.3",
+        UPDATE,
+        "two updates, real then generated",
+        choices=UPDATES,
+    )
     gan_learning_rate: float = setting(0.001, "noise GAN", AUTHOR, GAN_CODE, "Adam", "Adam, 0.001")
-    iterations: int = setting(1_000, "noise GAN", PAPER, "section 2.3", "around 1,000", "1,000", unit="iterations", smoke=20)
-    record_every: int = setting(100, "noise GAN", PAPER, "section 2.3", "100-step intervals", "100", unit="iterations", smoke=5)
-    rounds: int = setting(2, "noise GAN", OURS, "C4 follows training beyond the paper's number; all else uses the networks at it")
+    iterations: int = setting(
+        1_000,
+        "noise GAN",
+        PAPER,
+        "section 2.3",
+        "around 1,000",
+        "1,000",
+        unit="iterations",
+        smoke=20,
+    )
+    record_every: int = setting(
+        100,
+        "noise GAN",
+        PAPER,
+        "section 2.3",
+        "100-step intervals",
+        "100",
+        unit="iterations",
+        smoke=5,
+    )
+    rounds: int = setting(
+        2,
+        "noise GAN",
+        OURS,
+        "C4 follows training beyond the paper's number; all else uses the networks at it",
+    )
 
     # how claims are measured
-    detector_windows: int = setting(1_000, "claims", OURS, "to train a detector; as many set its threshold", unit="windows", smoke=60)
-    false_alarm_rate: float = setting(0.01, "claims", OURS, "of each threshold, on windows of the detector's own kind of training data")
-    num_components: int = setting(20, "claims", OURS, "of the PCA residual; the waves take up to four", unit="components")
+    detector_windows: int = setting(
+        1_000,
+        "claims",
+        OURS,
+        "to train a detector; as many set its threshold",
+        unit="windows",
+        smoke=60,
+    )
+    false_alarm_rate: float = setting(
+        0.01,
+        "claims",
+        OURS,
+        "of each threshold, on windows of the detector's own kind of training data",
+    )
+    num_components: int = setting(
+        20, "claims", OURS, "of the PCA residual; the waves take up to four", unit="components"
+    )
     num_trees: int = setting(200, "claims", OURS, "of the isolation forest", unit="trees")
-    autoencoder_epochs: int = setting(30, "claims", OURS, "of the dense autoencoder, 128-16-128", unit="epochs", smoke=2)
+    autoencoder_epochs: int = setting(
+        30, "claims", OURS, "of the dense autoencoder, 128-16-128", unit="epochs", smoke=2
+    )
     severity: float = setting(0.5, "claims", OURS, "the middle of the range, in each degraded mode")
-    speed_windows: int = setting(2_048, "claims", OURS, "generated at a time when C2 is timed", unit="windows", smoke=256)
+    speed_windows: int = setting(
+        2_048, "claims", OURS, "generated at a time when C2 is timed", unit="windows", smoke=256
+    )
 
-    fast: bool = setting(True, "enhancer, noise GAN", OURS, "faster steps, equal up to rounding but for the masks of dropout")
+    fast: bool = setting(
+        True,
+        "enhancer, noise GAN",
+        OURS,
+        "faster steps, equal up to rounding but for the masks of dropout",
+    )
 
     def of(self, *stages: str) -> dict[str, Any]:
         """The values on which the results of these stages depend, by name."""
         wanted = {"all", *stages}
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if wanted & {*field.metadata["stages"]}}
+        return {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(self)
+            if wanted & {*field.metadata["stages"]}
+        }
 
     @property
     def rows_of_each_kind(self) -> int:
@@ -135,10 +306,22 @@ def make_settings(budget: str = "full", **changed: Any) -> Settings:
     if budget not in BUDGETS:
         raise InputError(f"Expected a budget of {' or '.join(BUDGETS)}. Received: {budget!r}.")
     if unknown := sorted(set(changed) - set(fields)):
-        raise InputError(f"Expected one of the settings {', '.join(fields)}. Received: {unknown[0]!r}.")
-    smaller = {name: field.metadata["smoke"] for name, field in fields.items() if budget == "smoke" and field.metadata["smoke"] is not None}
-    settings = Settings(**smaller | {name: _converted(fields[name], value) for name, value in changed.items()})
-    if settings.window < settings.filter_width or settings.iterations % settings.record_every or settings.dropout >= 1:
+        raise InputError(
+            f"Expected one of the settings {', '.join(fields)}. Received: {unknown[0]!r}."
+        )
+    smaller = {
+        name: field.metadata["smoke"]
+        for name, field in fields.items()
+        if budget == "smoke" and field.metadata["smoke"] is not None
+    }
+    settings = Settings(
+        **smaller | {name: _converted(fields[name], value) for name, value in changed.items()}
+    )
+    if (
+        settings.window < settings.filter_width
+        or settings.iterations % settings.record_every
+        or settings.dropout >= 1
+    ):
         raise InputError(
             "Expected window of at least filter_width, iterations in multiples of record_every, and dropout below 1. "
             f"Received: window={settings.window}, iterations={settings.iterations}, dropout={settings.dropout}. Change one of them."
@@ -151,8 +334,14 @@ def _converted(field: dataclasses.Field, value: Any) -> Any:
     least = 1 if kind is int and field.name not in ("seed", "num_hidden") else 0
     end = 2**32 if field.name == "seed" else 1e12
     try:
-        converted = {"yes": True, "no": False, True: True, False: False}[value] if kind is bool else kind(value)
-        if (choices and converted not in choices) or (kind in (int, float) and not least <= converted < end):
+        converted = (
+            {"yes": True, "no": False, True: True, False: False}[value]
+            if kind is bool
+            else kind(value)
+        )
+        if (choices and converted not in choices) or (
+            kind in (int, float) and not least <= converted < end
+        ):
             raise ValueError
     except (KeyError, TypeError, ValueError):
         expected = " or ".join(choices) or {

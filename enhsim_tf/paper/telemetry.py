@@ -45,7 +45,9 @@ class Telemetry:
     @property
     def stamps(self) -> pd.DatetimeIndex:
         """Time of each sample in UTC, to the nanosecond."""
-        return pd.Timestamp(self.start) + pd.to_timedelta(np.round(1e9 * self.time).astype(np.int64), unit="ns")
+        return pd.Timestamp(self.start) + pd.to_timedelta(
+            np.round(1e9 * self.time).astype(np.int64), unit="ns"
+        )
 
     def part(self, first: int, stop: int) -> "Telemetry":
         """The samples from `first` up to `stop`."""
@@ -71,7 +73,11 @@ class ParquetStore:
     def write(self, telemetry: Telemetry) -> None:
         """Writes the series with the time of each sample."""
         table = pd.DataFrame({"time": telemetry.stamps, "value": telemetry.values})
-        table.attrs = {"interval": telemetry.interval, "start": telemetry.start, "name": telemetry.name}
+        table.attrs = {
+            "interval": telemetry.interval,
+            "start": telemetry.start,
+            "name": telemetry.name,
+        }
         table.to_parquet(self.path)
 
     def read(self) -> Telemetry:
@@ -85,7 +91,9 @@ def true_signal(settings: Settings) -> Callable[[np.ndarray], np.ndarray]:
 
     def signal(time: np.ndarray) -> np.ndarray:
         orbit = settings.orbit_amplitude * np.sin(2 * np.pi * time / settings.orbit_period)
-        return orbit + settings.rotation_amplitude * np.sin(2 * np.pi * time / settings.rotation_period)
+        return orbit + settings.rotation_amplitude * np.sin(
+            2 * np.pi * time / settings.rotation_period
+        )
 
     return signal
 
@@ -118,7 +126,9 @@ def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetr
     return parts
 
 
-def random_starts(num_samples: int, window: int, number: int, rng: np.random.Generator) -> np.ndarray:
+def random_starts(
+    num_samples: int, window: int, number: int, rng: np.random.Generator
+) -> np.ndarray:
     """First samples of windows "whose beginning and end are offset by a random amount so that all sample sizes are the same"."""
     return rng.integers(0, num_samples - window + 1, number)
 

@@ -27,7 +27,9 @@ class Drawn(NamedTuple):
 
     coarse: np.ndarray  # float32 of shape `(windows, samples, columns)`
     nominal: np.ndarray  # the same without a degraded mode
-    held: np.ndarray | None = None  # of each sample the one whose value it has: the first of a mechanism that is stuck; None if nothing is
+    held: np.ndarray | None = (
+        None  # of each sample the one whose value it has: the first of a mechanism that is stuck; None if nothing is
+    )
 
 
 class Waves:
@@ -47,19 +49,32 @@ class Waves:
     ):
         self.simulators, self.channels = tuple(simulators), tuple(channels)
         self.interval_s, self.window = float(interval_s), int(window)
-        self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
+        self.waveforms = (
+            tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
+        )
         self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
     def longest_period(self) -> float:
         """The longest period of a wave in samples; 0 if nothing is periodic."""
-        return max((each.waves[0].period_s for each in self.simulators if not each.is_constant), default=0.0) / self.interval_s
+        return (
+            max(
+                (each.waves[0].period_s for each in self.simulators if not each.is_constant),
+                default=0.0,
+            )
+            / self.interval_s
+        )
 
     def phases(self, channel: int) -> np.ndarray:
         """Coarse windows of a channel at all phases of its period, float32 of shape `(phases, samples)`."""
         period_s = max(wave.period_s for wave in self.simulators[channel].waves)
         starts = period_s * np.arange(_NUM_PHASES) / _NUM_PHASES
-        return self._in_unit(channel, self.simulators[channel].simulate(starts[:, None] + self.interval_s * np.arange(self.window)))
+        return self._in_unit(
+            channel,
+            self.simulators[channel].simulate(
+                starts[:, None] + self.interval_s * np.arange(self.window)
+            ),
+        )
 
     def align(self, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Finds phase, offset and gain of each channel in telemetry windows of shape `(windows, samples, channels)`.
@@ -70,12 +85,19 @@ class Waves:
         shift, gain = np.zeros((2, len(targets), targets.shape[2]))
         for channel, simulator in enumerate(self.simulators):
             target = targets[:, :, channel]
-            if simulator.is_constant:  # there is no shape to which a phase or a gain could be fitted
-                shift[:, channel], gain[:, channel] = target.mean(axis=1, dtype=np.float64), simulator.spread
+            if (
+                simulator.is_constant
+            ):  # there is no shape to which a phase or a gain could be fitted
+                shift[:, channel], gain[:, channel] = (
+                    target.mean(axis=1, dtype=np.float64),
+                    simulator.spread,
+                )
                 continue
             best = self.best_phases(targets, channel)
             coarse[:, :, channel] = self.phases(channel)[best]
-            shift[:, channel], gain[:, channel] = least_squares(self._waveform(channel)[best], target)
+            shift[:, channel], gain[:, channel] = least_squares(
+                self._waveform(channel)[best], target
+            )
         return coarse, shift, gain
 
     def _waveform(self, channel: int) -> np.ndarray:
@@ -87,7 +109,9 @@ class Waves:
         centred = waveform - waveform.mean(axis=1, keepdims=True, dtype=np.float64)
         length = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
         # the waveforms are centred, so the level of the telemetry has no effect
-        agreement = (target - target.mean(axis=1, keepdims=True)) @ (centred / np.where(length > 0, length, 1.0)).T.astype(np.float32)
+        agreement = (target - target.mean(axis=1, keepdims=True)) @ (
+            centred / np.where(length > 0, length, 1.0)
+        ).T.astype(np.float32)
         return np.argmax(agreement, axis=1)
 
     def on_one_clock(self, targets: np.ndarray) -> "Waves":
@@ -100,32 +124,71 @@ class Waves:
         for first, other in itertools.combinations(moving, 2):
             wave, old = simulators[first].waves[0], simulators[other].waves[0]
             if 0 < abs(old.period_s / wave.period_s - 1) < _SAME_PERIOD:
-                moved = (self.best_phases(targets, other) - self.best_phases(targets, first)) / _NUM_PHASES + old.phase - wave.phase
+                moved = (
+                    (self.best_phases(targets, other) - self.best_phases(targets, first))
+                    / _NUM_PHASES
+                    + old.phase
+                    - wave.phase
+                )
                 apart = np.angle(np.mean(np.exp(2j * np.pi * moved))) / (2 * np.pi)
                 phase = float(np.mod(wave.phase + apart, 1.0))
-                simulators[other] = SquareWaveSimulator([dataclasses.replace(old, period_s=wave.period_s, phase=phase)])
+                simulators[other] = SquareWaveSimulator(
+                    [dataclasses.replace(old, period_s=wave.period_s, phase=phase)]
+                )
         return Waves(simulators, self.channels, self.interval_s, self.window)
 
     def is_flat(self, gain: np.ndarray) -> np.ndarray:
         """Whether windows are too flat for the wave of a channel; `gain` is that of `align`, of shape `(windows, channels)` as the result."""
-        waves = np.array([0.0 if each.is_constant else level_offset_and_scale(each)[1] for each in self.simulators])
+        waves = np.array(
+            [
+                0.0 if each.is_constant else level_offset_and_scale(each)[1]
+                for each in self.simulators
+            ]
+        )
         return gain < MIN_GAIN * waves
 
-    def draw(self, starts: np.ndarray, scenarios: Sequence[Degraded | None], rng: np.random.Generator) -> Drawn:
+    def draw(
+        self, starts: np.ndarray, scenarios: Sequence[Degraded | None], rng: np.random.Generator
+    ) -> Drawn:
         """Simulates coarse windows that begin at these samples of the clock of the waves, each with its scenario or None."""
         starts, rows_of = np.asarray(starts), {}
         for row, scenario in enumerate(scenarios):
             if scenario is not None:
                 rows_of.setdefault(scenario, []).append(row)
-        nominal = np.concatenate([self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2)
-        changes = [(channel, rows, scenario, 0, self.window) for scenario, rows in rows_of.items() for channel in self._concerned(scenario)]
+        nominal = np.concatenate(
+            [self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2
+        )
+        changes = [
+            (channel, rows, scenario, 0, self.window)
+            for scenario, rows in rows_of.items()
+            for channel in self._concerned(scenario)
+        ]
         return self._degraded(nominal, starts, changes, rng) if changes else Drawn(nominal, nominal)
 
-    def draw_series(self, num_samples: int, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
+    def draw_series(
+        self,
+        num_samples: int,
+        events: Sequence[tuple[Degraded, int, int]],
+        rng: np.random.Generator,
+    ) -> Drawn:
         """Simulates one coarse series, as a single window of `num_samples`; each event is a mode, its first sample and its end."""
-        times, numbers = (self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
-        nominal = np.stack([self._in_unit(channel, self.simulators[channel].simulate(times)) for channel in numbers], axis=2)
-        changes = [(channel, [0], *event) for channel in numbers for event in events if channel in self._concerned(event[0])]
+        times, numbers = (
+            (self.interval_s * np.arange(num_samples))[None],
+            range(len(self.simulators)),
+        )
+        nominal = np.stack(
+            [
+                self._in_unit(channel, self.simulators[channel].simulate(times))
+                for channel in numbers
+            ],
+            axis=2,
+        )
+        changes = [
+            (channel, [0], *event)
+            for channel in numbers
+            for event in events
+            if channel in self._concerned(event[0])
+        ]
         return self._degraded(nominal, np.zeros(1, int), changes, rng)
 
     def _degraded(
@@ -140,10 +203,15 @@ class Waves:
         held = np.broadcast_to(np.arange(nominal.shape[1])[:, None], nominal.shape).copy()
         for channel, rows, scenario, begin, end in changes:
             times = self.interval_s * (starts[rows][:, None] + np.arange(begin, end))
-            coarse[rows, begin:end, channel] = self._in_unit(channel, self.simulators[channel].simulate(times, scenario, rng))
+            coarse[rows, begin:end, channel] = self._in_unit(
+                channel, self.simulators[channel].simulate(times, scenario, rng)
+            )
             stuck = held_samples(scenario, end - begin)
             if stuck is not None:
-                held[rows, begin + stuck[0] : begin + stuck[1], channel], is_stuck = begin + stuck[0], True
+                held[rows, begin + stuck[0] : begin + stuck[1], channel], is_stuck = (
+                    begin + stuck[0],
+                    True,
+                )
         return Drawn(coarse, nominal, held if is_stuck else None)
 
     def _nominal(self, channel: int, starts: np.ndarray) -> np.ndarray:
@@ -153,8 +221,12 @@ class Waves:
             if 2 * len(starts) * self.window < length:
                 each = self.interval_s * (starts[:, None] + np.arange(self.window))
                 return self._in_unit(channel, simulator.simulate(each))[:, :, None]
-            times = self.interval_s * np.arange(1 << length.bit_length())  # the next windows are hardly ever beyond its end
-            self._series[channel] = self._in_unit(channel, simulator.simulate(times[None]))[0][:, None]
+            times = self.interval_s * np.arange(
+                1 << length.bit_length()
+            )  # the next windows are hardly ever beyond its end
+            self._series[channel] = self._in_unit(channel, simulator.simulate(times[None]))[0][
+                :, None
+            ]
         return cut(self._series[channel : channel + 1], starts, self.window)
 
     def _concerned(self, scenario: Degraded) -> Sequence[int]:
@@ -227,7 +299,9 @@ class Runs:
                     "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
                 )
         run = self.usable(self.nominal)
-        windows = windows_of(run, np.asarray(starts) % num_window_starts(run.parts, self.window), self.window)
+        windows = windows_of(
+            run, np.asarray(starts) % num_window_starts(run.parts, self.window), self.window
+        )
         return Drawn(windows, windows)
 
 
@@ -239,6 +313,8 @@ def least_squares(waveform: np.ndarray, target: np.ndarray) -> tuple[np.ndarray,
     wave_mean, target_mean = (each.mean(axis=1, dtype=np.float64) for each in (waveform, target))
     centred = waveform - wave_mean[:, None]
     power = np.sum(centred**2, axis=1)
-    gain = np.sum(centred * (target - target_mean[:, None]), axis=1) / np.where(power > 0, power, 1.0)
+    gain = np.sum(centred * (target - target_mean[:, None]), axis=1) / np.where(
+        power > 0, power, 1.0
+    )
     gain = np.where(power > 0, gain, 0.0)
     return target_mean - gain * wave_mean, gain

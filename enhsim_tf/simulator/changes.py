@@ -24,7 +24,12 @@ def fade_length(window: int) -> int:
 
 
 def put_changes(
-    nominal: np.ndarray, degraded: np.ndarray, drawn: Drawn, ranges: Iterable[tuple[int, int]], fade: int, tolerance: np.ndarray
+    nominal: np.ndarray,
+    degraded: np.ndarray,
+    drawn: Drawn,
+    ranges: Iterable[tuple[int, int]],
+    fade: int,
+    tolerance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Puts the changes of degraded runs into nominal ones; returns the float32 runs, and a mask of the samples that differ.
 
@@ -37,7 +42,9 @@ def put_changes(
         tolerance: Largest difference from the nominal run that does not count as a change, shape `(channels,)`.
     """
     runs, mask = nominal.copy(), np.zeros(nominal.shape, bool)
-    weights = 0.5 + 0.5 * np.cos(np.pi * np.arange(fade + 2) / (fade + 1))  # from 1 where the degraded run is taken to 0 beyond the fade
+    weights = 0.5 + 0.5 * np.cos(
+        np.pi * np.arange(fade + 2) / (fade + 1)
+    )  # from 1 where the degraded run is taken to 0 beyond the fade
     for begin, end in ranges:
         here = slice(max(0, begin - fade), end + fade)
         own = slice(begin - here.start, end - here.start)
@@ -46,17 +53,30 @@ def put_changes(
         differs = drawn.coarse[:, begin:end] != drawn.nominal[:, begin:end]
         rows = (differs | is_held).any(axis=(1, 2))
         differs, old = (differs & ~is_held)[rows], nominal[rows, here]
-        first, last = begin + differs.argmax(axis=1)[:, None], end - 1 - differs[:, ::-1].argmax(axis=1)[:, None]
+        first, last = (
+            begin + differs.argmax(axis=1)[:, None],
+            end - 1 - differs[:, ::-1].argmax(axis=1)[:, None],
+        )
         places = np.arange(nominal.shape[1])[here, None]
-        distance = np.maximum(first - places, places - last)  # negative between the first and the last sample that differ
+        distance = np.maximum(
+            first - places, places - last
+        )  # negative between the first and the last sample that differ
         weight = weights[distance.clip(0, fade + 1)] * differs.any(axis=1)[:, None]
-        found = (old + weight * (np.asarray(degraded[rows, here], np.float64) - old)).astype(np.float32)
+        found = (old + weight * (np.asarray(degraded[rows, here], np.float64) - old)).astype(
+            np.float32
+        )
         changed = np.abs(found.astype(np.float64) - old) > tolerance
         found = np.where(changed, found, old)
         if held is not None:
             moving = found[:, own]
             still = np.take_along_axis(moving, held[rows], axis=1)
             stands = np.abs(moving.astype(np.float64) - still) > tolerance
-            found[:, own], changed[:, own] = np.where(stands, still, moving), changed[:, own] | stands
-        runs[rows, here], mask[rows, here] = np.where(changed, found, runs[rows, here]), mask[rows, here] | changed
+            found[:, own], changed[:, own] = (
+                np.where(stands, still, moving),
+                changed[:, own] | stands,
+            )
+        runs[rows, here], mask[rows, here] = (
+            np.where(changed, found, runs[rows, here]),
+            mask[rows, here] | changed,
+        )
     return runs, mask

@@ -13,7 +13,13 @@ from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.ridge import RidgeSolution
-from enhsim_tf.simulator.options import FEWEST_SAMPLES, LEAST_LEARNT, LEAST_WINDOW, MOST_WINDOW, default_window
+from enhsim_tf.simulator.options import (
+    FEWEST_SAMPLES,
+    LEAST_LEARNT,
+    LEAST_WINDOW,
+    MOST_WINDOW,
+    default_window,
+)
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import time_blocks
 
@@ -23,7 +29,12 @@ _CHANCE = 30.0  # divided by the number of samples: the share of the variance of
 _FEW_PERIODS = 8  # a wave that occurs less often is used only if no commands explain the telemetry
 _NUM_BLOCKS = 5  # of time, on which it is measured what commands explain
 _NUM_SHIFTS = 19  # of the commands in time, which show what they explain by chance
-_PENALTIES = (0.01, 0.1, 1.0, 10.0)  # of the ridge regression on traces, relative to the number of samples
+_PENALTIES = (
+    0.01,
+    0.1,
+    1.0,
+    10.0,
+)  # of the ridge regression on traces, relative to the number of samples
 _NEGLIGIBLE = 1e-6  # standard deviation of a trace
 
 
@@ -37,7 +48,10 @@ class CoarseChoice(NamedTuple):
 
 
 def choose_coarse(
-    parts: Sequence[Telemetry], window: int | None = None, commands: np.ndarray | None = None, refused: str | None = None
+    parts: Sequence[Telemetry],
+    window: int | None = None,
+    commands: np.ndarray | None = None,
+    refused: str | None = None,
 ) -> CoarseChoice:
     """Chooses the coarse simulator of a channel.
 
@@ -54,13 +68,23 @@ def choose_coarse(
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
     if len(values) < LEAST_SAMPLES:
         raise too_short(FEWEST_SAMPLES, name, parts)
-    coarse, about_wave, period, by_wave = (None, refused, np.nan, 0.0) if refused else _square_wave(longest)
-    traces, by_commands = (None, 0.0) if commands is None else _explained_by_commands(parts, commands)
-    is_wave_sure = by_commands <= by_wave and len(longest) >= _FEW_PERIODS * period  # few periods may be found in any slow telemetry
+    coarse, about_wave, period, by_wave = (
+        (None, refused, np.nan, 0.0) if refused else _square_wave(longest)
+    )
+    traces, by_commands = (
+        (None, 0.0) if commands is None else _explained_by_commands(parts, commands)
+    )
+    is_wave_sure = (
+        by_commands <= by_wave and len(longest) >= _FEW_PERIODS * period
+    )  # few periods may be found in any slow telemetry
     if coarse is not None and (is_wave_sure or not by_commands):
         wanted = window or int(np.clip(round(2 * period), LEAST_WINDOW, MOST_WINDOW))  # two periods
         # a window shorter than half a period shows no edge of the wave most of the time
-        fitting = _fitting_window(parts, wanted, wanted if window else max(FEWEST_SAMPLES, min(wanted, int(np.ceil(period / 2)))))
+        fitting = _fitting_window(
+            parts,
+            wanted,
+            wanted if window else max(FEWEST_SAMPLES, min(wanted, int(np.ceil(period / 2)))),
+        )
         if fitting:
             return CoarseChoice(fitting, f"coarse simulator: {about_wave}.", coarse)
         about_wave = f"{LEAST_LEARNT} windows of half the period of its best square wave, {period:.0f} samples, do not fit into {len(values):,} samples"
@@ -105,24 +129,45 @@ def _square_wave(telemetry: Telemetry) -> tuple[SquareWaveSimulator | None, str,
         f"part without a gap and explains {explained:.0%} of the variance there"
     )
     if explained < max(_LEAST_EXPLAINED, _CHANCE / samples):
-        return None, f"the best square wave explains only {max(explained, 0):.1%} of its variance", period, explained
+        return (
+            None,
+            f"the best square wave explains only {max(explained, 0):.1%} of its variance",
+            period,
+            explained,
+        )
     if period > samples / 2:
-        return None, f"the best square wave has a period of {period:.0f} of {samples:,} samples", period, explained
+        return (
+            None,
+            f"the best square wave has a period of {period:.0f} of {samples:,} samples",
+            period,
+            explained,
+        )
     return coarse, said, period, explained
 
 
 def _fitting_window(parts: Sequence[Telemetry], most: int, least: int) -> int | None:
     """Returns the longest window of which the parts hold eight, or None. Parts shorter than a window do not count."""
     lengths = np.array([len(part) for part in parts])
-    return next((window for window in range(most, least - 1, -1) if lengths[lengths >= window].sum() >= LEAST_LEARNT * window), None)
+    return next(
+        (
+            window
+            for window in range(most, least - 1, -1)
+            if lengths[lengths >= window].sum() >= LEAST_LEARNT * window
+        ),
+        None,
+    )
 
 
-def _explained_by_commands(parts: Sequence[Telemetry], commands: np.ndarray) -> tuple[CommandTraces | None, float]:
+def _explained_by_commands(
+    parts: Sequence[Telemetry], commands: np.ndarray
+) -> tuple[CommandTraces | None, float]:
     """Returns the traces of the commands, and the share of the variance that they explain on held-out blocks of time; 0 if by chance."""
     rows = np.concatenate([round(part.offset_s) + np.arange(len(part)) for part in parts])
     values = np.concatenate([part.values for part in parts]).astype(np.float64)
     if len(commands) <= rows.max():
-        raise InputError(f"Expected commands for {rows.max() + 1:,} samples. Received: {len(commands):,}. Give those of the same file.")
+        raise InputError(
+            f"Expected commands for {rows.max() + 1:,} samples. Received: {len(commands):,}. Give those of the same file."
+        )
     commands = commands[rows]
     traces = CommandTraces.fit(values, commands)
     if traces is None:
@@ -143,9 +188,16 @@ def _held_out_share(values: np.ndarray, commands: np.ndarray) -> float:
         if chosen is None:
             return 0.0
         inputs, targets = chosen.traces(commands)[:, None].astype(np.float64), values[:, None]
-        inputs *= inputs[training].std(axis=0) > _NEGLIGIBLE  # a trace that training does not show has no weight
+        inputs *= (
+            inputs[training].std(axis=0) > _NEGLIGIBLE
+        )  # a trace that training does not show has no weight
         solution = RidgeSolution(inputs[training], targets[training])
-        centred, inner = targets[held_out] - solution.target_mean, solution.project(inputs[held_out])
+        centred, inner = (
+            targets[held_out] - solution.target_mean,
+            solution.project(inputs[held_out]),
+        )
         for number, penalty in enumerate(_PENALTIES):
-            left[number] += np.sum((centred - inner @ solution.coefficients(penalty * len(training))) ** 2)
+            left[number] += np.sum(
+                (centred - inner @ solution.coefficients(penalty * len(training))) ** 2
+            )
     return float(1 - left.min() / (len(values) * np.var(values)))

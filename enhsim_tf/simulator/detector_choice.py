@@ -42,7 +42,9 @@ class JudgedDetector:
     name: str
     false_alarms: float  # share of held-out nominal samples that it flags
     allowed: float  # largest share with which it keeps its promise
-    recall: float  # mean over all kinds and severities of injected anomalies, those of relations apart
+    recall: (
+        float  # mean over all kinds and severities of injected anomalies, those of relations apart
+    )
     by_kind: dict[str, float]  # mean over severities
 
     @property
@@ -61,19 +63,31 @@ def choose_detector(judged: Sequence[JudgedDetector]) -> JudgedDetector:
     keeping = [each for each in judged if each.keeps]
     if not keeping:
         return min(judged, key=lambda each: each.false_alarms)
-    best, best_relation = max(each.recall for each in keeping), max(each.of_relations() for each in keeping)
-    near = [each for each in keeping if each.recall >= best - _EQUAL and each.of_relations() >= best_relation - _EQUAL]
+    best, best_relation = (
+        max(each.recall for each in keeping),
+        max(each.of_relations() for each in keeping),
+    )
+    near = [
+        each
+        for each in keeping
+        if each.recall >= best - _EQUAL and each.of_relations() >= best_relation - _EQUAL
+    ]
     return near[0] if near else max(keeping, key=lambda each: each.recall + each.of_relations())
 
 
-def judge_detectors(simulator: EnhancedSimulator, held_out: Recording, run: Recording | None, seed: int = 0) -> list[JudgedDetector]:
+def judge_detectors(
+    simulator: EnhancedSimulator, held_out: Recording, run: Recording | None, seed: int = 0
+) -> list[JudgedDetector]:
     """Judges all candidates on nominal telemetry after the fit, in parts of at least a window, and its coarse run, for recorded runs."""
     series = simulator.judged_series(held_out, run)
     windows, clean = simulator.windows_and_signal(held_out, run, 3 * _NUM_ANOMALOUS)
     below = np.zeros_like(clean) if run is None else clean
     some = np.linspace(0, len(windows) - 1, min(_NUM_ANOMALOUS, len(windows))).astype(int)
     unit = np.where(simulator.noise_sd > 0, simulator.noise_sd, simulator.scale)
-    anomalous = {key: each - below[some] for key, each in anomalous_windows(windows[some], unit, seed).items()}
+    anomalous = {
+        key: each - below[some]
+        for key, each in anomalous_windows(windows[some], unit, seed).items()
+    }
     if len(simulator.channels) > 1:
         relations = relation_anomalies(windows, clean, np.random.default_rng([seed, 17]))
         anomalous |= {key: each - below for key, each in relations.items()}
@@ -88,7 +102,10 @@ def judge_detectors(simulator: EnhancedSimulator, held_out: Recording, run: Reco
         nominal = scorer.score_windows(windows - below)
         limit = max(float(np.quantile(nominal, 1 - RATE)), scorer.threshold)
         recalls: dict[str, list[float]] = {}
-        scores = np.split(scorer.score_windows(anomalies), np.cumsum([len(each) for each in anomalous.values()])[:-1])
+        scores = np.split(
+            scorer.score_windows(anomalies),
+            np.cumsum([len(each) for each in anomalous.values()])[:-1],
+        )
         for (kind, _), some in zip(anomalous, scores, strict=True):
             recalls.setdefault(kind, []).append(metrics.recall(some, limit))
         by_kind = {kind: float(np.mean(each)) for kind, each in recalls.items()}
@@ -107,14 +124,22 @@ def anomalous_windows(
         for severity in severities:
             windows = found[kind, severity] = nominal.copy()
             for place, duration in enumerate(durations):
-                rows, rng = np.arange(place, len(windows), len(durations)), np.random.default_rng([seed, place])
+                rows, rng = (
+                    np.arange(place, len(windows), len(durations)),
+                    np.random.default_rng([seed, place]),
+                )
                 channel = rng.integers(0, windows.shape[2], len(rows))
                 unit = noise_sd[channel][:, None]
-                windows[rows, :, channel] = inject(windows[rows, :, channel] / unit, kind, severity, duration, 1.0, rng)[0] * unit
+                windows[rows, :, channel] = (
+                    inject(windows[rows, :, channel] / unit, kind, severity, duration, 1.0, rng)[0]
+                    * unit
+                )
     return found
 
 
-def relation_anomalies(windows: np.ndarray, clean: np.ndarray, rng: np.random.Generator) -> dict[tuple[str, float], np.ndarray]:
+def relation_anomalies(
+    windows: np.ndarray, clean: np.ndarray, rng: np.random.Generator
+) -> dict[tuple[str, float], np.ndarray]:
     """Makes anomalies that leave the values of every channel as they are, and change only how the channels move together.
 
     In each window one channel is that of another time, is shifted by a quarter of a window against the others, or has the noise of another
@@ -122,7 +147,12 @@ def relation_anomalies(windows: np.ndarray, clean: np.ndarray, rng: np.random.Ge
     """
     number, samples, channels = windows.shape
     rows, channel = np.arange(number), rng.integers(0, channels, number)
-    other, late, noise, away = windows.copy(), windows.copy(), windows.copy(), (rows + number // 2) % number
+    other, late, noise, away = (
+        windows.copy(),
+        windows.copy(),
+        windows.copy(),
+        (rows + number // 2) % number,
+    )
     other[rows, :, channel] = windows[away, :, channel]
     late[rows, :, channel] = np.roll(windows[rows, :, channel], round(_DELAY * samples), axis=1)
     noise[rows, :, channel] = clean[rows, :, channel] + (windows - clean)[away, :, channel]

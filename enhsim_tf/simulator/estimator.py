@@ -29,8 +29,19 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
     >>> is_anomalous = detector.predict(new) == -1
     """
 
-    def __init__(self, window: int | None = None, detector: str | None = None, false_alarm_rate: float = 0.01, seed: int = 0):
-        self.window, self.detector, self.false_alarm_rate, self.seed = window, detector, false_alarm_rate, seed
+    def __init__(
+        self,
+        window: int | None = None,
+        detector: str | None = None,
+        false_alarm_rate: float = 0.01,
+        seed: int = 0,
+    ):
+        self.window, self.detector, self.false_alarm_rate, self.seed = (
+            window,
+            detector,
+            false_alarm_rate,
+            seed,
+        )
 
     def fit(self, X: np.ndarray, y: Any = None) -> "TelemetryDetector":  # noqa: N803  as scikit-learn names it
         """Fits simulator and detector to nominal telemetry of shape `(samples, channels)`; `y` is not used.
@@ -42,9 +53,16 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
         """
         X = validate_data(self, X, dtype=np.float32)  # noqa: N806
         names = tuple(f"channel {number}" for number in range(X.shape[1]))
-        simulator, self.report_ = fit(Recording((Run(X),), names, name="telemetry"), None, FitOptions(window=self.window, seed=self.seed))
+        simulator, self.report_ = fit(
+            Recording((Run(X),), names, name="telemetry"),
+            None,
+            FitOptions(window=self.window, seed=self.seed),
+        )
         self.simulator_ = simulator
-        self.scorer_ = Scorer(simulator, ScoreOptions(self.detector, false_alarm_rate=self.false_alarm_rate, seed=self.seed))
+        self.scorer_ = Scorer(
+            simulator,
+            ScoreOptions(self.detector, false_alarm_rate=self.false_alarm_rate, seed=self.seed),
+        )
         self.offset_, self.threshold_ = -1.0, 1.0
         self.decision_scores_ = self.scorer_.score_series(X)
         self.labels_ = (self.decision_scores_ > self.threshold_).astype(int)
@@ -59,7 +77,9 @@ class TelemetryDetector(OutlierMixin, BaseEstimator):
         check_is_fitted(self)
         X, window = validate_data(self, X, dtype=np.float32, reset=False), self.simulator_.window  # noqa: N806
         if len(X) < window:
-            raise InputError(f"Expected at least a window of {window} samples. Received: {len(X)}. Give more telemetry.")
+            raise InputError(
+                f"Expected at least a window of {window} samples. Received: {len(X)}. Give more telemetry."
+            )
         return -self.scorer_.score_series(X)
 
     def decision_function(self, X: np.ndarray) -> np.ndarray:  # noqa: N803

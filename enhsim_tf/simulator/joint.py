@@ -31,7 +31,10 @@ def join_channels(channels: Mapping[str, Sequence[Telemetry] | Telemetry]) -> li
     """
     if not channels:
         raise InputError("Expected at least one channel. Received: none. Give telemetry.")
-    parts = {name: [each] if isinstance(each, Telemetry) else list(each) for name, each in channels.items()}
+    parts = {
+        name: [each] if isinstance(each, Telemetry) else list(each)
+        for name, each in channels.items()
+    }
     groups: list[list[str]] = []
     for name, each in parts.items():
         for part in each:
@@ -39,7 +42,10 @@ def join_channels(channels: Mapping[str, Sequence[Telemetry] | Telemetry]) -> li
         own = each[0]
         for group in groups:
             first = parts[group[0]][0]
-            if first.has_time == own.has_time and abs(first.interval_s / own.interval_s - 1) <= SAME_RATE:
+            if (
+                first.has_time == own.has_time
+                and abs(first.interval_s / own.interval_s - 1) <= SAME_RATE
+            ):
                 break
         else:
             groups.append(group := [])
@@ -56,26 +62,54 @@ def join_channels(channels: Mapping[str, Sequence[Telemetry] | Telemetry]) -> li
 def telemetry_of(recording: Recording, channel: int = 0) -> list[Telemetry]:
     """Returns the parts of one channel, given by its number."""
     interval_s, start, name = recording.interval_s, recording.start, recording.columns[channel]
-    return [Telemetry(part.values[:, channel], interval_s, part.offset_s, start, name) for part in recording.parts]
+    return [
+        Telemetry(part.values[:, channel], interval_s, part.offset_s, start, name)
+        for part in recording.parts
+    ]
 
 
 def _joined(channels: Mapping[str, Sequence[Telemetry]]) -> Recording | None:
     """Returns the stretches that all channels cover; None if there are none."""
     first = next(iter(channels.values()))[0]
-    interval_s, zero = first.interval_s, nanoseconds(dataclasses.replace(first, offset_s=0.0), 0, 1)[0]
-    placed = [[(round(float(nanoseconds(part, 0, 1)[0] - zero) / 1e9 / interval_s), part) for part in parts] for parts in channels.values()]
-    edges = sorted(edge for own in placed for begin, part in own for edge in ((begin, 1), (begin + len(part), -1)))
-    covering = itertools.accumulate(change for _, change in edges)  # number of channels that cover the time after each edge
+    interval_s, zero = (
+        first.interval_s,
+        nanoseconds(dataclasses.replace(first, offset_s=0.0), 0, 1)[0],
+    )
+    placed = [
+        [
+            (round(float(nanoseconds(part, 0, 1)[0] - zero) / 1e9 / interval_s), part)
+            for part in parts
+        ]
+        for parts in channels.values()
+    ]
+    edges = sorted(
+        edge
+        for own in placed
+        for begin, part in own
+        for edge in ((begin, 1), (begin + len(part), -1))
+    )
+    covering = itertools.accumulate(
+        change for _, change in edges
+    )  # number of channels that cover the time after each edge
     runs = []
     for ((low, _), (high, _)), number in zip(itertools.pairwise(edges), covering, strict=False):
         if number == len(placed) and low < high:
-            columns = [part.values[low - begin : high - begin] for own in placed for begin, part in own if begin <= low < begin + len(part)]
+            columns = [
+                part.values[low - begin : high - begin]
+                for own in placed
+                for begin, part in own
+                if begin <= low < begin + len(part)
+            ]
             runs.append(Run(np.stack(columns, axis=1).astype(np.float32), low * interval_s))
     names = tuple(channels)
-    return Recording(tuple(runs), names, interval_s, first.start, ", ".join(names)) if runs else None
+    return (
+        Recording(tuple(runs), names, interval_s, first.start, ", ".join(names)) if runs else None
+    )
 
 
-def split_end(recording: Recording | None, share: float) -> tuple[Recording | None, Recording | None]:
+def split_end(
+    recording: Recording | None, share: float
+) -> tuple[Recording | None, Recording | None]:
     """Splits telemetry into its beginning and its end, which has this share of the samples, below 1; None for what has no sample."""
     if recording is None:
         return None, None
@@ -84,14 +118,23 @@ def split_end(recording: Recording | None, share: float) -> tuple[Recording | No
     for part in recording.parts:
         cut = min(max(left, 0), len(part))
         first += [Run(part.values[:cut], part.offset_s)] if cut else []
-        rest += [Run(part.values[cut:], part.offset_s + cut * recording.interval_s)] if cut < len(part) else []
+        rest += (
+            [Run(part.values[cut:], part.offset_s + cut * recording.interval_s)]
+            if cut < len(part)
+            else []
+        )
         left -= len(part)
-    return tuple(dataclasses.replace(recording, parts=tuple(some)) if some else None for some in (first, rest))
+    return tuple(
+        dataclasses.replace(recording, parts=tuple(some)) if some else None
+        for some in (first, rest)
+    )
 
 
 def long_enough(recording: Recording | None, window: int) -> Recording | None:
     """Returns the parts that are at least a window long; None if there are none."""
-    parts = () if recording is None else tuple(part for part in recording.parts if len(part) >= window)
+    parts = (
+        () if recording is None else tuple(part for part in recording.parts if len(part) >= window)
+    )
     return dataclasses.replace(recording, parts=parts) if parts else None
 
 
@@ -116,7 +159,9 @@ def times_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarra
     """Returns the first sample of each window on the clock of the recording, integers of shape `(windows,)`."""
     usable = [part for part in recording.parts if len(part) >= window]
     which, places = places_in_parts(usable, starts, window)
-    return np.array([round(part.offset_s / recording.interval_s) for part in usable])[which] + places
+    return (
+        np.array([round(part.offset_s / recording.interval_s) for part in usable])[which] + places
+    )
 
 
 def spread_of(windows: np.ndarray) -> np.ndarray:
@@ -127,7 +172,9 @@ def spread_of(windows: np.ndarray) -> np.ndarray:
 
 def nrmse(estimate: np.ndarray, windows: np.ndarray) -> np.ndarray:
     """Returns the root-mean-square error of each channel, divided by the standard deviation of its windows."""
-    return np.sqrt(np.mean((estimate - windows) ** 2, axis=(0, 1), dtype=np.float64)) / spread_of(windows)
+    return np.sqrt(np.mean((estimate - windows) ** 2, axis=(0, 1), dtype=np.float64)) / spread_of(
+        windows
+    )
 
 
 def rounded(values: np.ndarray, quantisation: Sequence[Levels | None]) -> np.ndarray:

@@ -38,7 +38,9 @@ def folder_of(models: str | os.PathLike, name: str) -> Path:
     try:
         found = urllib.parse.quote(name, safe=" ").replace(".", "%2E")
     except UnicodeEncodeError:
-        raise InputError(f"Expected a channel name of Unicode characters. Received: {name[:60]!r}. Rename it.") from None
+        raise InputError(
+            f"Expected a channel name of Unicode characters. Received: {name[:60]!r}. Rename it."
+        ) from None
     found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # Windows strips them
     if _RESERVED.fullmatch(found):
         found = f"%{ord(found[0]):02X}{found[1:]}"
@@ -53,17 +55,25 @@ def folder_of(models: str | os.PathLike, name: str) -> Path:
 def name_of_channels(channels: Sequence[str]) -> str:
     """Returns the name of a model: that of its channel, or those of its channels joined by `~`, shortened if there are many."""
     joined = "~".join(channels)
-    return joined if len(channels) == 1 or len(joined.encode()) <= _MOST_NAME else f"{channels[0]}~{len(channels) - 1} more"
+    return (
+        joined
+        if len(channels) == 1 or len(joined.encode()) <= _MOST_NAME
+        else f"{channels[0]}~{len(channels) - 1} more"
+    )
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:
     """Returns the folders of the fitted simulators in a folder, or of the one that it is, by name; raises InputError if there is none."""
     models = Path(os.path.abspath(models))  # so that "." has a name too
-    if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
+    if os.path.isfile(
+        models / MANIFEST
+    ):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
     manifests = sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else []
     if not manifests:
-        raise InputError(f"Expected a folder of fitted simulators. Received: {models}, which contains none. Make one with `fit`.")
+        raise InputError(
+            f"Expected a folder of fitted simulators. Received: {models}, which contains none. Make one with `fit`."
+        )
     return {urllib.parse.unquote(manifest.parent.name): manifest.parent for manifest in manifests}
 
 
@@ -71,7 +81,9 @@ def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dic
     """Selects models of `models_of` by name; None or an empty sequence selects all. Raises InputError for a name that there is not."""
     unknown = [name for name in channels or () if name not in models]
     if unknown:
-        raise InputError(f"Expected --channel, one of: {', '.join(list(models)[:8])}. Received: {unknown[0]!r}.")
+        raise InputError(
+            f"Expected --channel, one of: {', '.join(list(models)[:8])}. Received: {unknown[0]!r}."
+        )
     return {name: models[name] for name in channels or models}
 
 
@@ -81,14 +93,20 @@ def refuse_foreign(folder: str | os.PathLike) -> None:
     if (folder / MANIFEST).is_file():  # other programs write files of this name too
         with open(folder / MANIFEST, "rb") as file:
             is_ours = f'"{_FAMILY}'.encode() in file.read(1_000)
-    if os.path.lexists(folder) and not is_ours and not (folder.is_dir() and not any(folder.iterdir())):
+    if (
+        os.path.lexists(folder)
+        and not is_ours
+        and not (folder.is_dir() and not any(folder.iterdir()))
+    ):
         raise InputError(
             f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which contains something else. "
             "Give another folder, or another --out."
         )
 
 
-def write_saved(folder: str | os.PathLike, arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any]) -> None:
+def write_saved(
+    folder: str | os.PathLike, arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any]
+) -> None:
     """Writes a simulator to a folder atomically, in place of one that was there: its arrays by name, and settings in plain JSON types.
 
     Raises InputError if the folder contains something else.
@@ -110,14 +128,22 @@ def read_saved(folder: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[s
     form, checksums = _values_of(folder / MANIFEST, "format", "sha256")
     if form != _FAMILY + _NUMBER:
         number = str(form).removeprefix(_FAMILY)[:80]
-        raise InputError(f"Expected a model of format {_NUMBER}. Received: format {number} in {folder}. Fit it again.")
-    files = {name: (folder / name).read_bytes() for name in (_ARRAYS, _SETTINGS) if (folder / name).is_file()}
+        raise InputError(
+            f"Expected a model of format {_NUMBER}. Received: format {number} in {folder}. Fit it again."
+        )
+    files = {
+        name: (folder / name).read_bytes()
+        for name in (_ARRAYS, _SETTINGS)
+        if (folder / name).is_file()
+    }
     if checksums != {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}:
         raise InputError(
             f"Expected {_ARRAYS} and {_SETTINGS} to be unchanged since they were saved. Received: a missing or damaged file in {folder}. "
             "Fit it again."
         )
-    with np.load(io.BytesIO(files[_ARRAYS]), allow_pickle=False) as arrays:  # unpickling could run code
+    with np.load(
+        io.BytesIO(files[_ARRAYS]), allow_pickle=False
+    ) as arrays:  # unpickling could run code
         return dict(arrays), json.loads(files[_SETTINGS])
 
 

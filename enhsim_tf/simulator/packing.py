@@ -23,7 +23,17 @@ _ARGUMENTS = {
     CommandTraces: ("chosen",),
     Recording: ("parts", "columns", "interval_s", "start", "name"),
     Run: ("values", "offset_s"),
-    Enhancer: ("name", "window", "columns", "channels", "centre", "bias", "factors", "layers", "main"),
+    Enhancer: (
+        "name",
+        "window",
+        "columns",
+        "channels",
+        "centre",
+        "bias",
+        "factors",
+        "layers",
+        "main",
+    ),
     WindowBootstrap: ("windows", "signals"),
     Levels: ("step", "origin", "count"),
 }
@@ -43,7 +53,10 @@ def packed(value: Any, arrays: dict[str, np.ndarray], name: str) -> Any:
     if isinstance(value, tuple | list):
         return [packed(each, arrays, f"{name}/{number}") for number, each in enumerate(value)]
     if type(value) in _ARGUMENTS:
-        arguments = {each: packed(getattr(value, each), arrays, f"{name}/{each}") for each in _ARGUMENTS[type(value)]}
+        arguments = {
+            each: packed(getattr(value, each), arrays, f"{name}/{each}")
+            for each in _ARGUMENTS[type(value)]
+        }
         return {"kind": type(value).__name__} | arguments
     if value is None or isinstance(value, str | int | float):
         return value
@@ -58,5 +71,7 @@ def unpacked(state: Any, arrays: Mapping[str, np.ndarray]) -> Any:
     if isinstance(state, list):
         return tuple(unpacked(each, arrays) for each in state)
     if isinstance(state, dict) and "kind" in state:
-        return _KINDS[state["kind"]](**{name: unpacked(each, arrays) for name, each in state.items() if name != "kind"})
+        return _KINDS[state["kind"]](
+            **{name: unpacked(each, arrays) for name, each in state.items() if name != "kind"}
+        )
     return arrays[state["array"]] if isinstance(state, dict) else state

@@ -55,28 +55,52 @@ class Scorer:
     def __init__(self, simulator: EnhancedSimulator, options: ScoreOptions | None = None):
         self.simulator, self.options = simulator, options or ScoreOptions()
         self.window = simulator.window
-        self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", "PCA residual"))).detector
+        self.name = (
+            self.options.detector
+            or ScoreOptions(str(simulator.trained.get("detector", "PCA residual"))).detector
+        )
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
-        self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
+        self.unit = (
+            np.ones(1)
+            if len(simulator.channels) == 1
+            else simulator.noise_sd
+            if self.on_residual
+            else simulator.scale
+        )
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
         # of the generated series, in windows
-        self._length = int(np.clip(_SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS))
+        self._length = int(
+            np.clip(
+                _SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS
+            )
+        )
         seed = self.options.seed
-        training = simulator.generate(self.options.num_windows, seed=seed, with_noise=not simulator.is_run_model)
+        training = simulator.generate(
+            self.options.num_windows, seed=seed, with_noise=not simulator.is_run_model
+        )
         if simulator.is_run_model:
             training = simulator.draw_noise(training, np.random.default_rng([seed, 3]))
         means = training.mean(axis=1, dtype=np.float64)
         width = np.maximum(np.ptp(means, axis=0), simulator.noise_sd)
-        self._low, self._high = means.min(axis=0) - width, means.max(axis=0) + width  # levels beyond count as residual
+        self._low, self._high = (
+            means.min(axis=0) - width,
+            means.max(axis=0) + width,
+        )  # levels beyond count as residual
         if self.name == RESIDUAL:
-            self._joint = None if len(simulator.channels) == 1 else JointSize().fit(self._judged(training))
+            self._joint = (
+                None if len(simulator.channels) == 1 else JointSize().fit(self._judged(training))
+            )
             self.typical_size = float(np.median(self._sizes(training)))
         else:
             self.detector = DETECTORS[self.name](seed).fit(self._judged(training))
-        generated, self.rate = metrics.finite_threshold(self._of_generated(seed + 1), self.options.false_alarm_rate, self._length)
+        generated, self.rate = metrics.finite_threshold(
+            self._of_generated(seed + 1), self.options.false_alarm_rate, self._length
+        )
         self.nominal_threshold = -np.inf
         for real in self._of_nominal():
-            found, _ = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)
+            found, _ = metrics.finite_threshold(
+                real, self.options.false_alarm_rate, len(real) // self.window
+            )
             self.nominal_threshold = max(self.nominal_threshold, found)
         self.threshold = max(generated, self.nominal_threshold)
 
@@ -99,15 +123,21 @@ class Scorer:
         held_out = 1 - self.simulator.trained.get("num_samples", len(nominal)) / len(nominal)
         found = [self._of_recording(nominal, run)]
         if held_out:
-            found.append(self._of_recording(*(split_end(each, held_out)[1] for each in (nominal, run))))
+            found.append(
+                self._of_recording(*(split_end(each, held_out)[1] for each in (nominal, run)))
+            )
         return [scores for scores in found if len(scores)]
 
     def _of_recording(self, nominal: Recording, run: Recording | None) -> np.ndarray:
         """Scores nominal telemetry: of parts with too many values the end."""
-        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * len(nominal.parts)))
+        most = max(
+            self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * len(nominal.parts))
+        )
 
         def end(recording: Recording) -> Recording:
-            return dataclasses.replace(recording, parts=tuple(Run(part.values[-most:]) for part in recording.parts))
+            return dataclasses.replace(
+                recording, parts=tuple(Run(part.values[-most:]) for part in recording.parts)
+            )
 
         series = self.simulator.judged_series(end(nominal), None if run is None else end(run))
         return np.concatenate([np.zeros(0), *map(self._raw, series)])
@@ -123,14 +153,20 @@ class Scorer:
         begins = run_starts(len(series), self.window, max(1, self.window // _STRIDES))
         step = max(1, _CHUNK_VALUES // (self.window * series.shape[1]))
         chunks = (begins[first : first + step] for first in range(0, len(begins), step))
-        scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
-        if self.name == RESIDUAL:  # its scale follows the windows before, so it sees all sizes at once
+        scores = np.concatenate(
+            [self.score_windows(cut([series], chunk, self.window)) for chunk in chunks]
+        )
+        if (
+            self.name == RESIDUAL
+        ):  # its scale follows the windows before, so it sees all sizes at once
             scores = following_drift(scores, self.typical_size)
         return mean_over_windows(scores, begins, self.window, len(series))
 
     def _sizes(self, windows: np.ndarray) -> np.ndarray:
         judged = self._judged(windows)
-        sizes = root_mean_square(judged) if self._joint is None else np.sqrt(self._joint.score(judged))
+        sizes = (
+            root_mean_square(judged) if self._joint is None else np.sqrt(self._joint.score(judged))
+        )
         if self.simulator.is_run_model:
             return sizes
         means = windows.mean(axis=1, dtype=np.float64)
@@ -205,15 +241,27 @@ def score(
     if run is not None:
         names = ("enhanced",) if single else [f"enhanced {name}" for name in simulator.channels]
         columns |= dict(zip(names, enhanced.T, strict=True))
-    columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
+    columns |= {"score": scores, "flag": scores > 1} | (
+        {} if run is None else {"out_of_range": outside}
+    )
     frame = pd.DataFrame(columns, index=index_of(telemetry_of(telemetry)))
-    departure, nominal = find_departure(simulator, scorer.score_series, scores, judged), scorer.nominal_scores
-    num_alarms, edges = len(events_of(nominal > 1, gap=scorer.window)), np.cumsum([0, *map(len, telemetry.parts)])
+    departure, nominal = (
+        find_departure(simulator, scorer.score_series, scores, judged),
+        scorer.nominal_scores,
+    )
+    num_alarms, edges = (
+        len(events_of(nominal > 1, gap=scorer.window)),
+        np.cumsum([0, *map(len, telemetry.parts)]),
+    )
     frame.attrs = {
         "detector": scorer.name,
         "expected_false_alarm_rate": scorer.rate,
-        "false_alarms_per_day": list(false_alarms_per_day(num_alarms, len(nominal) * simulator.interval_s)),
-        "events": event_rows(scores, edges, nominal, scorer.window, simulator.interval_s, departure),
+        "false_alarms_per_day": list(
+            false_alarms_per_day(num_alarms, len(nominal) * simulator.interval_s)
+        ),
+        "events": event_rows(
+            scores, edges, nominal, scorer.window, simulator.interval_s, departure
+        ),
         "counts": telemetry.clock().counts,
         "departure": "",
     }
@@ -225,13 +273,18 @@ def score(
 
 def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> None:
     """Raises InputError if channels or interval differ, if a coarse run is missing, or if one is given that the simulator cannot use."""
-    if telemetry.columns != simulator.channels and not len(telemetry.columns) == len(simulator.channels) == 1:
+    if (
+        telemetry.columns != simulator.channels
+        and not len(telemetry.columns) == len(simulator.channels) == 1
+    ):
         raise InputError(
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
         )
     if abs(telemetry.interval_s - simulator.interval_s) > SAME_RATE * simulator.interval_s:
         given = (f"every {telemetry.interval_s:g} s", "the same sampling interval, or --interval")
-        received, give = given if telemetry.start is not None else ("samples without times", "a time column")
+        received, give = (
+            given if telemetry.start is not None else ("samples without times", "a time column")
+        )
         raise InputError(
             f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: {received}. Give telemetry with {give}."
         )
@@ -244,11 +297,17 @@ def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
         simulator.recorded_runs()
 
 
-def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> list[tuple[int, np.ndarray]]:
+def _stretches(
+    simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None
+) -> list[tuple[int, np.ndarray]]:
     """The first sample and the coarse values of each stretch that can be scored; without a run, the telemetry itself."""
     places = np.cumsum([0, *map(len, telemetry.parts)])
     if run is None:
-        return [(place, part.values) for place, part in zip(places, telemetry.parts, strict=False) if len(part) >= simulator.window]
+        return [
+            (place, part.values)
+            for place, part in zip(places, telemetry.parts, strict=False)
+            if len(part) >= simulator.window
+        ]
     found, (_, coarse) = [], simulator.alignment.pair(telemetry, run)
     for place, part in zip(places, telemetry.parts, strict=False):
         for stretch in coarse.parts:
@@ -261,7 +320,11 @@ def _stretches(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
 def _departure_text(frame: pd.DataFrame, departure: Departure) -> str:
     when = told_times(frame, frame.index[[departure.begin]])[0]
     when = f"{when:.10g} s" if isinstance(when, float) else when
-    moved = "." if departure.settled is not None else ", which a moved level and amplitude do not reach, so they are no events."
+    moved = (
+        "."
+        if departure.settled is not None
+        else ", which a moved level and amplitude do not reach, so they are no events."
+    )
     return (
         f"1 lasting departure since {when}: the telemetry has left what was learnt and stays there ({', '.join(departure.what)}). It is a lasting "
         f"fault, or the new normal: then go on with `update`. score_after are scores against the new operating point{moved}"
@@ -269,7 +332,12 @@ def _departure_text(frame: pd.DataFrame, departure: Departure) -> str:
 
 
 def event_rows(
-    scores: np.ndarray, edges: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float, departure: Departure | None = None
+    scores: np.ndarray,
+    edges: Sequence[int],
+    nominal_scores: np.ndarray,
+    window: int,
+    interval_s: float,
+    departure: Departure | None = None,
 ) -> list[dict]:
     """Returns the events in plain JSON types; flags of a part within a window of each other are one event, as they share windows.
 
@@ -279,7 +347,9 @@ def event_rows(
     end = len(scores) if departure is None else departure.begin
     found = [(LEARNT, scores, event) for event in _events(scores, 0, end, edges, window)]
     if departure is not None:
-        found.append((LEARNT, scores, Event(end, len(scores), end + int(np.nanargmax(scores[end:])))))
+        found.append(
+            (LEARNT, scores, Event(end, len(scores), end + int(np.nanargmax(scores[end:]))))
+        )
         if departure.settled is not None:
             later = _events(departure.scores, departure.settled, len(scores), edges, window)
             found += [(NEW, departure.scores, event) for event in later]
@@ -295,16 +365,22 @@ def event_rows(
             "confidence": float(confidence),
             "against": against,
         }
-        for (against, own, event), peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True)
+        for (against, own, event), peak, confidence in zip(
+            found, peaks, confidences(peaks, nominal_scores, window), strict=True
+        )
     ]
 
 
-def _events(scores: np.ndarray, begin: int, end: int, edges: Sequence[int], window: int) -> list[Event]:
+def _events(
+    scores: np.ndarray, begin: int, end: int, edges: Sequence[int], window: int
+) -> list[Event]:
     """The events of each part among the samples from `begin` to `end`."""
     found = []
     for first, last in itertools.pairwise(np.clip(edges, begin, end).tolist()):
         own = scores[first:last]
-        found += [Event(*(first + place for place in event)) for event in events_of(own > 1, own, window)]
+        found += [
+            Event(*(first + place for place in event)) for event in events_of(own > 1, own, window)
+        ]
     return found
 
 
@@ -327,7 +403,11 @@ def events_table(frame: pd.DataFrame) -> pd.DataFrame:
     names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence", "against"]
     table = pd.DataFrame(frame.attrs["events"], columns=names)
     index, (begin, end, peak) = frame.index, table[["begin", "end", "peak"]].to_numpy(int).T
-    step = pd.to_timedelta(table["duration_s"].to_numpy(float) / (end - begin), unit="s").round("us") if hasattr(index, "tz") else 1
+    step = (
+        pd.to_timedelta(table["duration_s"].to_numpy(float) / (end - begin), unit="s").round("us")
+        if hasattr(index, "tz")
+        else 1
+    )
     places = {"begin": index[begin], "end": index[end - 1] + step, "peak": index[peak]}
     return table.assign(**{name: told_times(frame, place) for name, place in places.items()})
 
@@ -346,4 +426,6 @@ def write_scores(path: str | os.PathLike, frame: pd.DataFrame) -> None:
         if Path(path).suffix == ".csv":
             plain.to_csv(temporary)
         else:
-            plain.to_parquet(temporary, index=True)  # sample numbers, too, are a column for every reader
+            plain.to_parquet(
+                temporary, index=True
+            )  # sample numbers, too, are a column for every reader

@@ -27,7 +27,17 @@ from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 _CHUNK_VALUES = 2_000_000  # values that are generated at a time
-_SAVED = ("alignment", "enhancer", "noise", "channels", "interval_s", "levels", "quantisation", "nominal", "level_step")  # beside `trained`
+_SAVED = (
+    "alignment",
+    "enhancer",
+    "noise",
+    "channels",
+    "interval_s",
+    "levels",
+    "quantisation",
+    "nominal",
+    "level_step",
+)  # beside `trained`
 _NUM_NOISE = 256  # windows of generated noise from which its standard deviation is computed
 
 
@@ -67,10 +77,21 @@ class EnhancedSimulator:
         trained: Mapping[str, Any] | None = None,
         level_step: float | None = None,
     ):
-        self.alignment, self.enhancer, self.noise, self.nominal = alignment, enhancer, noise, nominal
+        self.alignment, self.enhancer, self.noise, self.nominal = (
+            alignment,
+            enhancer,
+            noise,
+            nominal,
+        )
         self.channels, self.interval_s = tuple(channels), float(interval_s)
-        self.levels = None if levels is None else np.asarray(levels, np.float64).reshape(-1, len(self.channels), 2)
-        self.quantisation = tuple(quantisation) if quantisation is not None else (None,) * len(self.channels)
+        self.levels = (
+            None
+            if levels is None
+            else np.asarray(levels, np.float64).reshape(-1, len(self.channels), 2)
+        )
+        self.quantisation = (
+            tuple(quantisation) if quantisation is not None else (None,) * len(self.channels)
+        )
         self.trained = dict(trained or {})
         self.level_step = float(level_step or max(1, enhancer.window // 2))
 
@@ -92,17 +113,26 @@ class EnhancedSimulator:
     @functools.cached_property
     def noise_sd(self) -> np.ndarray:
         """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
-        return np.std(self.draw_noise(self.generate(_NUM_NOISE, with_noise=False), np.random.default_rng(0)), axis=(0, 1), dtype=np.float64)
+        return np.std(
+            self.draw_noise(self.generate(_NUM_NOISE, with_noise=False), np.random.default_rng(0)),
+            axis=(0, 1),
+            dtype=np.float64,
+        )
 
     @functools.cached_property
     def scale(self) -> np.ndarray:
         """Standard deviation of the generated telemetry of each channel, shape `(channels,)`; 1 for a constant one."""
-        deviation = np.hypot(np.std(self.generate(_NUM_NOISE, with_noise=False), axis=(0, 1), dtype=np.float64), self.noise_sd)
+        deviation = np.hypot(
+            np.std(self.generate(_NUM_NOISE, with_noise=False), axis=(0, 1), dtype=np.float64),
+            self.noise_sd,
+        )
         return np.where(deviation > 0, deviation, 1.0)
 
     # enhancement
 
-    def enhance(self, coarse: np.ndarray, shift: np.ndarray | None = None, gain: np.ndarray | None = None) -> np.ndarray:
+    def enhance(
+        self, coarse: np.ndarray, shift: np.ndarray | None = None, gain: np.ndarray | None = None
+    ) -> np.ndarray:
         """Enhances coarse windows of shape `(windows, samples, columns)`; no noise is added (step 5 of the paper's pipeline).
 
         `shift` and `gain` are offset and factor of each window and channel, shape `(windows, channels)`. The result is float32 of shape
@@ -110,7 +140,9 @@ class EnhancedSimulator:
         """
         columns = self.enhancer.columns
         if np.ndim(coarse) != 3 or np.shape(coarse)[1:] != (self.window, columns):
-            raise InputError(f"Expected coarse windows of shape (windows, {self.window}, {columns}). Received: {np.shape(coarse)}.")
+            raise InputError(
+                f"Expected coarse windows of shape (windows, {self.window}, {columns}). Received: {np.shape(coarse)}."
+            )
         enhanced = self.enhancer.predict(coarse)
         if shift is not None and gain is not None:
             enhanced *= gain[:, None].astype(np.float32)
@@ -123,12 +155,21 @@ class EnhancedSimulator:
         The run has the shape `(samples, columns)` and at least a window of samples; the result is float32 of shape `(samples, channels)`.
         """
         coarse = np.asarray(coarse, np.float32)
-        if coarse.ndim != 2 or coarse.shape[1] != self.enhancer.columns or len(coarse) < self.window:
+        if (
+            coarse.ndim != 2
+            or coarse.shape[1] != self.enhancer.columns
+            or len(coarse) < self.window
+        ):
             raise InputError(
                 f"Expected a run of shape (samples, {self.enhancer.columns}) with at least {self.window} samples. Received: {coarse.shape}."
             )
         starts = run_starts(len(coarse), self.window)
-        return average_windows(lambda rows: self.enhance(cut([coarse], starts[rows], self.window)), starts, self.window, len(coarse))
+        return average_windows(
+            lambda rows: self.enhance(cut([coarse], starts[rows], self.window)),
+            starts,
+            self.window,
+            len(coarse),
+        )
 
     def residuals(self, targets: np.ndarray) -> np.ndarray:
         """Returns telemetry windows of shape `(windows, samples, channels)` minus the square waves that are aligned with them, enhanced.
@@ -137,10 +178,14 @@ class EnhancedSimulator:
         """
         coarse, _, gain = self.alignment.align(targets)
         learnt = self.levels[:, :, 1]
-        left = targets - np.clip(gain, learnt.min(axis=0) / 2, learnt.max(axis=0) * 2)[:, None] * self.enhance(coarse)
+        left = targets - np.clip(gain, learnt.min(axis=0) / 2, learnt.max(axis=0) * 2)[
+            :, None
+        ] * self.enhance(coarse)
         return (left - left.mean(axis=1, keepdims=True)).astype(np.float32)
 
-    def windows_and_signal(self, telemetry: Recording, run: Recording | None, number: int) -> tuple[np.ndarray, np.ndarray]:
+    def windows_and_signal(
+        self, telemetry: Recording, run: Recording | None, number: int
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Returns so many evenly spaced windows of telemetry, shape `(windows, samples, channels)`, and the enhanced signal of the same times.
 
         For recorded runs, `run` is the coarse run with the same parts.
@@ -149,14 +194,20 @@ class EnhancedSimulator:
         windows = windows_of(telemetry, starts, self.window)
         if run is None:
             return windows, self.enhance(*self.alignment.align(windows))
-        return windows, cut([self.enhance_run(part.values) for part in run.parts], starts, self.window)
+        return windows, cut(
+            [self.enhance_run(part.values) for part in run.parts], starts, self.window
+        )
 
     def judged_series(self, telemetry: Recording, run: Recording | None) -> list[np.ndarray]:
         """Returns what detectors judge: the parts of the telemetry that have a window, without the enhanced run of the same parts, if given."""
         found = []
         for number, part in enumerate(telemetry.parts):
             if len(part) >= self.window:
-                found.append(part.values if run is None else part.values - self.enhance_run(run.parts[number].values))
+                found.append(
+                    part.values
+                    if run is None
+                    else part.values - self.enhance_run(run.parts[number].values)
+                )
         return found
 
     # noise
@@ -168,7 +219,13 @@ class EnhancedSimulator:
 
     # windows
 
-    def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0, with_noise: bool = True) -> np.ndarray:
+    def generate(
+        self,
+        num_windows: int,
+        scenario: Degraded | None = None,
+        seed: int = 0,
+        with_noise: bool = True,
+    ) -> np.ndarray:
         """Generates realistic telemetry windows: enhanced signal plus generated noise ("Combined").
 
         Args:
@@ -197,23 +254,42 @@ class EnhancedSimulator:
 
         Memory does not grow with the number of windows. A sample that is not marked equals that of the same seed without a scenario.
         """
-        rng, noise_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1]) if with_noise else None
+        rng, noise_rng = (
+            np.random.default_rng(seed),
+            np.random.default_rng([seed, 1]) if with_noise else None,
+        )
         num_windows = len(scenarios)
         starts = rng.integers(0, START_RANGE, num_windows)
-        rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
+        rows = np.random.default_rng([seed, 2]).integers(
+            0, 1 if self.levels is None else len(self.levels), num_windows
+        )
         chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
         for first in range(0, num_windows, chunk):
             some = slice(first, first + chunk)
             drawn = self.alignment.draw(starts[some], scenarios[some], rng)
-            levels = () if self.levels is None else np.moveaxis(self.levels[rows[some]], 2, 0)  # offset and gain of each window and channel
+            levels = (
+                () if self.levels is None else np.moveaxis(self.levels[rows[some]], 2, 0)
+            )  # offset and gain of each window and channel
             clean = windows = self.enhance(drawn.nominal, *levels)
             mask = np.zeros(clean.shape, bool)
             degraded = [row for row, scenario in enumerate(scenarios[some]) if scenario is not None]
             if degraded:
-                windows, own = clean.copy(), Drawn(*(None if each is None else each[degraded] for each in drawn))
-                changed, fade = self.enhance(own.coarse, *(each[degraded] for each in levels)), fade_length(self.window)
-                windows[degraded], mask[degraded] = put_changes(clean[degraded], changed, own, [(0, self.window)], fade, self._tolerance)
-            yield (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
+                windows, own = (
+                    clean.copy(),
+                    Drawn(*(None if each is None else each[degraded] for each in drawn)),
+                )
+                changed, fade = (
+                    self.enhance(own.coarse, *(each[degraded] for each in levels)),
+                    fade_length(self.window),
+                )
+                windows[degraded], mask[degraded] = put_changes(
+                    clean[degraded], changed, own, [(0, self.window)], fade, self._tolerance
+                )
+            yield (
+                (windows, mask)
+                if noise_rng is None
+                else self._with_noise(windows, clean, mask, noise_rng)
+            )
 
     @property
     def _tolerance(self) -> np.ndarray:
@@ -228,17 +304,25 @@ class EnhancedSimulator:
         values = rounded(check_finite(windows + noise), self.quantisation)
         if mask.any():
             is_quantised = [levels is not None for levels in self.quantisation]
-            mask[..., is_quantised] &= (values != rounded(clean + noise, self.quantisation))[..., is_quantised]
+            mask[..., is_quantised] &= (values != rounded(clean + noise, self.quantisation))[
+                ..., is_quantised
+            ]
         return values, mask
 
     # series
 
-    def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+    def generate_series(
+        self, num_samples: int, scenario: Degraded | None = None, seed: int = 0
+    ) -> np.ndarray:
         """Generates one continuous series, float32 of shape `(num_samples, channels)`; see `generate_labelled_series`."""
         return self.generate_labelled_series(num_samples, scenario, seed)[0]
 
     def generate_labelled_series(
-        self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, schedule: Sequence[PlacedEvent] = ()
+        self,
+        num_samples: int,
+        scenario: Degraded | None = None,
+        seed: int = 0,
+        schedule: Sequence[PlacedEvent] = (),
     ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
         """Generates one continuous series of any length without visible joins, with a mask of what a degraded mode has changed.
 
@@ -258,23 +342,39 @@ class EnhancedSimulator:
         """
         _check_count("num_samples", num_samples, 1)
         if scenario is not None and schedule:
-            raise InputError("Expected a scenario or a schedule. Received: both. Put the scenario into the schedule.")
-        schedule, noise_rng = in_order(schedule, [(0, num_samples)], gap=1), np.random.default_rng([seed, 1])
+            raise InputError(
+                "Expected a scenario or a schedule. Received: both. Put the scenario into the schedule."
+            )
+        schedule, noise_rng = (
+            in_order(schedule, [(0, num_samples)], gap=1),
+            np.random.default_rng([seed, 1]),
+        )
         if self.is_run_model:
             self.alignment.draw(np.zeros(0, int), [scenario, *schedule], noise_rng)  # refuses them
             clean = self.nominal_series(num_samples)
             return *self._with_noise(clean, clean, np.zeros(clean.shape, bool), noise_rng), []
-        events = [(Degraded(each.kind, each.severity, 0.0), each.begin, each.end) for each in schedule]
+        events = [
+            (Degraded(each.kind, each.severity, 0.0), each.begin, each.end) for each in schedule
+        ]
         events += [] if scenario is None else [(scenario, 0, num_samples)]
         window, hop = self.window, self.window // 2
-        num_windows = 1 + max(0, -(-(num_samples - window) // hop))  # that overlap by half and cover the series
-        drawn = self.alignment.draw_series(window + (num_windows - 1) * hop, events, np.random.default_rng(seed))
+        num_windows = 1 + max(
+            0, -(-(num_samples - window) // hop)
+        )  # that overlap by half and cover the series
+        drawn = self.alignment.draw_series(
+            window + (num_windows - 1) * hop, events, np.random.default_rng(seed)
+        )
         levels = self._following_levels(num_windows, seed)
         series = clean = self._join_series(drawn.nominal[0], levels)[:num_samples]
         mask = np.zeros(clean.shape, bool)
         if events:
-            degraded, ranges = self._join_series(drawn.coarse[0], levels)[:num_samples], [event[1:] for event in events]
-            (series,), (mask,) = put_changes(clean[None], degraded[None], drawn, ranges, fade_length(window), self._tolerance)
+            degraded, ranges = (
+                self._join_series(drawn.coarse[0], levels)[:num_samples],
+                [event[1:] for event in events],
+            )
+            (series,), (mask,) = put_changes(
+                clean[None], degraded[None], drawn, ranges, fade_length(window), self._tolerance
+            )
         values, mask = self._with_noise(series, clean, mask, noise_rng)
         return values, mask, _changed_events(mask.any(axis=1), events)
 
@@ -283,7 +383,9 @@ class EnhancedSimulator:
         starts = np.arange(0, len(coarse) - self.window + 1, self.window // 2)
 
         def windows_at(rows: slice) -> np.ndarray:
-            return self.enhance(cut([coarse], starts[rows], self.window), levels[rows, :, 0], levels[rows, :, 1])
+            return self.enhance(
+                cut([coarse], starts[rows], self.window), levels[rows, :, 0], levels[rows, :, 1]
+            )
 
         return average_windows(windows_at, starts, self.window, len(coarse))
 
@@ -291,13 +393,18 @@ class EnhancedSimulator:
         """Returns offset and gain of consecutive windows: those seen in training, forwards and backwards from a random time."""
         cycle = np.concatenate([self.levels, self.levels[-2:0:-1]])
         begin = np.random.default_rng([seed, 2]).integers(0, len(cycle))
-        rows = np.floor((self.window // 2) / self.level_step * np.arange(num_windows)).astype(int)  # as fast as in the telemetry
+        rows = np.floor((self.window // 2) / self.level_step * np.arange(num_windows)).astype(
+            int
+        )  # as fast as in the telemetry
         return cycle[(begin + rows) % len(cycle)]
 
     @functools.cached_property
     def _nominal_clean(self) -> list[np.ndarray]:
         """The parts of the nominal run, enhanced."""
-        return [self.enhance_run(part.values) for part in self.recorded_runs().usable(self.alignment.nominal).parts]
+        return [
+            self.enhance_run(part.values)
+            for part in self.recorded_runs().usable(self.alignment.nominal).parts
+        ]
 
     def nominal_series(self, num_samples: int) -> np.ndarray:
         """Returns the enhanced nominal run, repeated if the series is longer; parts and repetitions are cross-faded."""
@@ -313,7 +420,9 @@ class EnhancedSimulator:
 
     # runs of the user's simulator
 
-    def generate_copies(self, run: Recording, num_copies: int, seed: int = 0) -> Iterator[list[np.ndarray]]:
+    def generate_copies(
+        self, run: Recording, num_copies: int, seed: int = 0
+    ) -> Iterator[list[np.ndarray]]:
         """Yields copies of a run, for example of a fault: the enhanced run plus another draw of noise in each copy.
 
         A copy is one float32 array of shape `(samples, channels)` for each part of `alignment.usable(run)`. The first copies do not depend on
@@ -323,7 +432,10 @@ class EnhancedSimulator:
         clean = [self.enhance_run(part.values) for part in self.recorded_runs().usable(run).parts]
         for number in range(num_copies):
             rng = np.random.default_rng([seed, 1, number])
-            yield [rounded(enhanced + self.draw_noise(enhanced, rng), self.quantisation) for enhanced in clean]
+            yield [
+                rounded(enhanced + self.draw_noise(enhanced, rng), self.quantisation)
+                for enhanced in clean
+            ]
 
     def recorded_runs(self) -> Runs:
         """Returns the alignment of a simulator of recorded runs; raises InputError if it is one of square waves."""
@@ -350,24 +462,48 @@ class EnhancedSimulator:
         """Loads a saved simulator; raises InputError if the folder was not written by `save`, or a file in it has changed since."""
         arrays, settings = read_saved(folder)
         try:
-            return cls(**{name: unpacked(settings[name], arrays) for name in _SAVED}, trained=settings["trained"])
+            return cls(
+                **{name: unpacked(settings[name], arrays) for name in _SAVED},
+                trained=settings["trained"],
+            )
         except READ_ERRORS as error:
-            raise InputError(f"Expected the parts of a simulator. Received: {folder} ({short_reason(error)}). Fit it again.") from None
+            raise InputError(
+                f"Expected the parts of a simulator. Received: {folder} ({short_reason(error)}). Fit it again."
+            ) from None
 
 
-def _changed_events(changed: np.ndarray, events: Sequence[tuple[Degraded, int, int]]) -> list[tuple[str, float, int, int]]:
+def _changed_events(
+    changed: np.ndarray, events: Sequence[tuple[Degraded, int, int]]
+) -> list[tuple[str, float, int, int]]:
     """Mode, severity, first changed sample and end of the events that changed a sample; what lies between two belongs to the nearer."""
-    edges = [0, *((before[2] + after[1]) // 2 for before, after in itertools.pairwise(events)), len(changed)]
+    edges = [
+        0,
+        *((before[2] + after[1]) // 2 for before, after in itertools.pairwise(events)),
+        len(changed),
+    ]
     found = []
     for (scenario, *_), begin, end in zip(events, edges[:-1], edges[1:], strict=False):
         places = np.flatnonzero(changed[begin:end])
-        found += [(scenario.mode, scenario.severity, begin + int(places[0]), begin + int(places[-1]) + 1)] if len(places) else []
+        found += (
+            [
+                (
+                    scenario.mode,
+                    scenario.severity,
+                    begin + int(places[0]),
+                    begin + int(places[-1]) + 1,
+                )
+            ]
+            if len(places)
+            else []
+        )
     return found
 
 
 def _check_count(name: str, count: Any, least: int) -> None:
     if not (isinstance(count, int | np.integer) and count >= least):
-        raise InputError(f"Expected {name} to be a whole number, at least {least}. Received: {name}={count!r}.")
+        raise InputError(
+            f"Expected {name} to be a whole number, at least {least}. Received: {name}={count!r}."
+        )
 
 
 def check_finite(windows: np.ndarray) -> np.ndarray:

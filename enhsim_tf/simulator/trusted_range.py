@@ -15,7 +15,9 @@ from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _RATE = 0.01  # share of nominal windows that count as outside the range
 _NUM_NOMINAL = 900  # coarse windows for fitting the range, and as many others for its limit
-_LEAST_LIMIT = 1e-3  # lower bound of the limit, for periodic coarse windows whose scores are all close to 0
+_LEAST_LIMIT = (
+    1e-3  # lower bound of the limit, for periodic coarse windows whose scores are all close to 0
+)
 
 
 class TrustedRange:
@@ -47,20 +49,33 @@ class TrustedRange:
     def score(self, coarse: np.ndarray) -> np.ndarray:
         """Scores coarse windows of shape `(windows, samples, columns)`, float64 of shape `(windows,)`; 1 % of nominal windows are above 1."""
         rows = self._rows(coarse)
-        scores = np.sqrt(np.mean(rows**2, axis=1, dtype=np.float64)) if self._range is None else self._range.score(rows)
+        scores = (
+            np.sqrt(np.mean(rows**2, axis=1, dtype=np.float64))
+            if self._range is None
+            else self._range.score(rows)
+        )
         return scores / self._limit
 
     def score_run(self, coarse: np.ndarray) -> np.ndarray:
         """Scores a run of shape `(samples, columns)`: the mean score of the windows that contain each sample, float32 of shape `(samples,)`."""
         window, starts = self.simulator.window, run_starts(len(coarse), self.simulator.window)
         scores = self.score(cut([np.asarray(coarse, np.float32)], starts, window))
-        return average_windows(lambda rows: np.repeat(scores[rows, None, None], window, axis=1), starts, window, len(coarse))[:, 0]
+        return average_windows(
+            lambda rows: np.repeat(scores[rows, None, None], window, axis=1),
+            starts,
+            window,
+            len(coarse),
+        )[:, 0]
 
     def share_outside(self, *scenarios: Degraded | None) -> float:
         """Returns the share of 200 windows of the scenarios, used in turn, that are outside the training range; None is nominal."""
         return float(np.mean(self.score(self._drawn(scenarios, 200, seed=2)) > 1))
 
-    def _drawn(self, scenarios: Sequence[Degraded | None], num_windows: int, seed: int) -> np.ndarray:
+    def _drawn(
+        self, scenarios: Sequence[Degraded | None], num_windows: int, seed: int
+    ) -> np.ndarray:
         rng = np.random.default_rng([seed, 3])
         in_turn = list(itertools.islice(itertools.cycle(scenarios), num_windows))
-        return self.simulator.alignment.draw(rng.integers(0, START_RANGE, num_windows), in_turn, rng).coarse
+        return self.simulator.alignment.draw(
+            rng.integers(0, START_RANGE, num_windows), in_turn, rng
+        ).coarse

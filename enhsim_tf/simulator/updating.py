@@ -26,7 +26,9 @@ class UpdateReport:
     channels: list[str]
     num_samples: int
     num_held_out: int
-    before: dict[str, Any]  # `level`, `gain`, `period_s`, `noise_sd` and `nrmse` by channel, and `alarms`, the share of flagged samples
+    before: dict[
+        str, Any
+    ]  # `level`, `gain`, `period_s`, `noise_sd` and `nrmse` by channel, and `alarms`, the share of flagged samples
     after: dict[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
@@ -36,7 +38,9 @@ class UpdateReport:
     def lines(self) -> list[str]:
         """Returns the report as lines of text."""
         all_of_them = ", ".join(self.channels)
-        lines = [f"{all_of_them}: updated with {self.num_samples:,} samples; judged on {self.num_held_out:,} held-out ones of them"]
+        lines = [
+            f"{all_of_them}: updated with {self.num_samples:,} samples; judged on {self.num_held_out:,} held-out ones of them"
+        ]
         for name in self.channels:
             parts = []
             for what in ("level", "gain", "period_s", "noise_sd", "nrmse"):
@@ -44,12 +48,18 @@ class UpdateReport:
                 if old is not None and new is not None:
                     parts.append(f"{what.removesuffix('_s')} {old:.5g} -> {new:.5g}")
             lines.append(f"{name}: {', '.join(parts)}")
-        lines.append(f"{all_of_them}: flagged samples {self.before['alarms']:.1%} -> {self.after['alarms']:.1%}, set for 1 %")
+        lines.append(
+            f"{all_of_them}: flagged samples {self.before['alarms']:.1%} -> {self.after['alarms']:.1%}, set for 1 %"
+        )
         return [printable(line) for line in lines]
 
 
 def update(
-    simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None = None, held_out: float = 0.2, seed: int = 0
+    simulator: EnhancedSimulator,
+    telemetry: Recording,
+    run: Recording | None = None,
+    held_out: float = 0.2,
+    seed: int = 0,
 ) -> tuple[EnhancedSimulator, UpdateReport]:
     """Updates a simulator with newer nominal telemetry.
 
@@ -70,7 +80,10 @@ def update(
     options = FitOptions(**simulator.trained["options"] | {"held_out": held_out, "seed": seed})
     telemetry = dataclasses.replace(telemetry, columns=simulator.channels)
     new, _ = fit(telemetry, run, options)
-    new.trained["updates"] = [*simulator.trained.get("updates", ()), {"num_samples": len(telemetry), "held_out": held_out, "seed": seed}]
+    new.trained["updates"] = [
+        *simulator.trained.get("updates", ()),
+        {"num_samples": len(telemetry), "held_out": held_out, "seed": seed},
+    ]
     window = max(simulator.window, new.window)
     judged = telemetry if run is None else simulator.recorded_runs().pair(telemetry, run)[0]
     end = long_enough(split_end(judged, held_out)[1], window) or long_enough(judged, window)
@@ -78,18 +91,27 @@ def update(
     return new, UpdateReport(list(simulator.channels), len(telemetry), len(end), before, after)
 
 
-def _state(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None, seed: int) -> dict[str, Any]:
+def _state(
+    simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None, seed: int
+) -> dict[str, Any]:
     if run is not None:
         telemetry, run = simulator.recorded_runs().pair(telemetry, run)
     real, clean = simulator.windows_and_signal(telemetry, run, _NUM_WINDOWS)
     found: dict[str, Any] = {"level": {}, "gain": {}, "period_s": {}}
     if run is None:
-        waves = zip(simulator.channels, simulator.alignment.simulators, np.median(simulator.levels, axis=0).tolist(), strict=True)
+        waves = zip(
+            simulator.channels,
+            simulator.alignment.simulators,
+            np.median(simulator.levels, axis=0).tolist(),
+            strict=True,
+        )
         for name, wave, (found["level"][name], found["gain"][name]) in waves:
             if not wave.is_constant:
                 found["period_s"][name] = float(wave.waves[0].period_s)
     for what, each in (("nrmse", nrmse(clean, real)), ("noise_sd", simulator.noise_sd)):
         found[what] = dict(zip(simulator.channels, each.tolist(), strict=True))
     scorer = Scorer(simulator, ScoreOptions(seed=seed))
-    flags = np.concatenate([scorer.score_series(each) > 1 for each in simulator.judged_series(telemetry, run)])
+    flags = np.concatenate(
+        [scorer.score_series(each) > 1 for each in simulator.judged_series(telemetry, run)]
+    )
     return found | {"alarms": float(flags.mean())}

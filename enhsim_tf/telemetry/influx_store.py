@@ -24,7 +24,14 @@ _SHOWN = 3  # number of series listed in a message
 _RANGE = "start: time(v: -9223372036000000000), stop: time(v: 9223372036854775806)"  # all times that InfluxDB has, from a whole second
 _URL = r"https?://(?:[\w.-]+|\[[\da-fA-F:.]+\])(?::[1-9]\d{0,4})?(?:/[!-~]*)?"  # without a name or a password
 _TIMEOUT_MS = 60_000  # of a request, unless INFLUXDB_V2_TIMEOUT is set; a disk may be slow
-_MAY_PASS = (408, 429, 500, 502, 503, 504)  # HTTP status codes of a server that is busy or still starting
+_MAY_PASS = (
+    408,
+    429,
+    500,
+    502,
+    503,
+    504,
+)  # HTTP status codes of a server that is busy or still starting
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +41,9 @@ class InfluxLocation:
     bucket: str
     measurement: str
     field: str
-    tags: tuple[tuple[str, str], ...] = ()  # pairs of tag and value that all points of the series have
+    tags: tuple[
+        tuple[str, str], ...
+    ] = ()  # pairs of tag and value that all points of the series have
 
     def __str__(self) -> str:
         path = "/".join(map(_encode, (self.bucket, self.measurement, self.field)))
@@ -53,9 +62,14 @@ def parse_location(text: str) -> InfluxLocation:
         if not str(text).startswith(SCHEME):
             raise ValueError
         str(text).encode()  # half a character is no text
-        bucket, measurement, field = (urllib.parse.unquote(part, errors="strict") for part in path.split("/"))
+        bucket, measurement, field = (
+            urllib.parse.unquote(part, errors="strict") for part in path.split("/")
+        )
         pairs = [pair.split("=") for pair in query.split("&")] if query else []
-        tags = {urllib.parse.unquote(key, errors="strict"): urllib.parse.unquote(value, errors="strict") for key, value in pairs}
+        tags = {
+            urllib.parse.unquote(key, errors="strict"): urllib.parse.unquote(value, errors="strict")
+            for key, value in pairs
+        }
         if len(tags) < len(pairs) or not all((bucket, measurement, field, *tags, *tags.values())):
             raise ValueError
     except ValueError:
@@ -121,20 +135,36 @@ class InfluxStore:
                 f"Expected finite values. Received: {values[bad[0]]} at sample {bad[0]}, which InfluxDB cannot store. Fill or cut it."
             )
         names = (place.measurement, place.field, *(part for pair in place.tags for part in pair))
-        wrong = [part for part in names if not part.isprintable() or part.endswith("\\") or part.startswith(("_", "#")) or part == "time"]
+        wrong = [
+            part
+            for part in names
+            if not part.isprintable()
+            or part.endswith("\\")
+            or part.startswith(("_", "#"))
+            or part == "time"
+        ]
         if wrong:
             raise InputError(
                 "Expected names without control characters, a backslash at the end or _ or # at the beginning, and none that is time. "
                 f"Received: {wrong[0]!r}. Write to another location."
             )
-        point = {"measurement": place.measurement, "tags": dict(place.tags), "fields": {place.field: True}}
+        point = {
+            "measurement": place.measurement,
+            "tags": dict(place.tags),
+            "fields": {place.field: True},
+        }
         begin = Point.from_dict(point).to_line_protocol().removesuffix("true")
 
         def send(client: Any) -> None:
-            api = client.write_api(SYNCHRONOUS)  # its own writer of data frames is not used: it evaluates the names of tags as code
+            api = client.write_api(
+                SYNCHRONOUS
+            )  # its own writer of data frames is not used: it evaluates the names of tags as code
             for first in range(0, len(values), BATCH):
                 # float32 to float64 is exact, and so is the shortest decimal form of the float64
-                batch = zip(*(array[first : first + BATCH].tolist() for array in (values, times)), strict=True)
+                batch = zip(
+                    *(array[first : first + BATCH].tolist() for array in (values, times)),
+                    strict=True,
+                )
                 lines = "\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch])
                 api.write(place.bucket, record=lines.encode(), write_precision="ns")
 
@@ -152,38 +182,82 @@ class InfluxStore:
         """
         from influxdb_client import Dialect
 
-        wanted = {"_measurement": self.location.measurement, "_field": self.location.field} | dict(self.location.tags)
-        matches = " and ".join(f"r[{_quote(column)}] == {_quote(value)}" for column, value in wanted.items())
+        wanted = {"_measurement": self.location.measurement, "_field": self.location.field} | dict(
+            self.location.tags
+        )
+        matches = " and ".join(
+            f"r[{_quote(column)}] == {_quote(value)}" for column, value in wanted.items()
+        )
         points = f"from(bucket: {_quote(self.location.bucket)}) |> range({_RANGE}) |> filter(fn: (r) => {matches})"
-        rows = self._request(lambda client: list(itertools.islice(client.query_api().query_stream(f"{points} |> first()"), _SHOWN)))
+        rows = self._request(
+            lambda client: list(
+                itertools.islice(client.query_api().query_stream(f"{points} |> first()"), _SHOWN)
+            )
+        )
         tags = [
-            {key: value for key, value in row.values.items() if not key.startswith("_") and key not in ("result", "table")} for row in rows
+            {
+                key: value
+                for key, value in row.values.items()
+                if not key.startswith("_") and key not in ("result", "table")
+            }
+            for row in rows
         ]
         if len(rows) > 1:
-            found = " or ".join(str(dataclasses.replace(self.location, tags=tuple(sorted(each.items())))) for each in tags)
-            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {found}.")
+            found = " or ".join(
+                str(dataclasses.replace(self.location, tags=tuple(sorted(each.items()))))
+                for each in tags
+            )
+            raise InputError(
+                f"Expected one series at {self.location}. Received: several. Name one by its tags: {found}."
+            )
         if not rows:
-            raise InputError(f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags.")
+            raise InputError(
+                f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags."
+            )
         query, plain = f'{points} |> keep(columns: ["_time", "_value"])', Dialect(annotations=[])
-        return _parse(self._request(lambda client: client.query_api().query_raw(query, dialect=plain).read(), retries=16))
+        return _parse(
+            self._request(
+                lambda client: client.query_api().query_raw(query, dialect=plain).read(), retries=16
+            )
+        )
 
     def _request(self, request: Callable[[Any], _Answer], retries: int = 0) -> _Answer:
         """Calls a function with the client, which repeats what may pass; raises an `InputError` if that does not succeed."""
         from influxdb_client import InfluxDBClient
-        from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
+        from influxdb_client.client.flux_csv_parser import (
+            FluxCsvParserException,
+            FluxQueryException,
+        )
         from influxdb_client.rest import ApiException
         from urllib3 import Retry
         from urllib3.exceptions import HTTPError
 
-        options = {"redirect": False, "allowed_methods": None, "status_forcelist": _MAY_PASS, "raise_on_status": False}
+        options = {
+            "redirect": False,
+            "allowed_methods": None,
+            "status_forcelist": _MAY_PASS,
+            "raise_on_status": False,
+        }
         try:
-            client = InfluxDBClient.from_env_properties(retries=Retry(retries, backoff_factor=0.1, backoff_max=5, **options))
+            client = InfluxDBClient.from_env_properties(
+                retries=Retry(retries, backoff_factor=0.1, backoff_max=5, **options)
+            )
             if "INFLUXDB_V2_TIMEOUT" not in os.environ:
                 client.api_client.configuration.timeout = _TIMEOUT_MS
             return request(client)
-        except (ApiException, FluxQueryException, FluxCsvParserException, HTTPError, OSError) as error:
+        except (
+            ApiException,
+            FluxQueryException,
+            FluxCsvParserException,
+            HTTPError,
+            OSError,
+        ) as error:
             status = getattr(error, "status", None)
-            said = " ".join(str(getattr(error, "message", None) if status else getattr(error, "reason", error)).split())[:300]
+            said = " ".join(
+                str(
+                    getattr(error, "message", None) if status else getattr(error, "reason", error)
+                ).split()
+            )[:300]
             if status == 401:
                 words = f"Expected a token that {self.url} knows. Received: another in {VARIABLES[1]}. Copy it again."
             elif isinstance(error, FluxCsvParserException) or (status == 404 and "not" not in said):
@@ -197,21 +271,27 @@ class InfluxStore:
                 )
         except ValueError:
             words = "Expected numbers in INFLUXDB_V2_TIMEOUT and INFLUXDB_V2_CONNECTION_POOL_MAXSIZE. Received: others. Correct them."
-        raise InputError(words)  # outside the except block: the client's own error, which may contain the token, is not chained
+        raise InputError(
+            words
+        )  # outside the except block: the client's own error, which may contain the token, is not chained
 
 
 def _check_variables() -> tuple[str, str]:
     """Checks the environment variables that the client reads, whose own errors would show the token; returns URL and organisation."""
     missing = [name for name in VARIABLES if not os.environ.get(name, "").strip()]
     if missing:
-        raise InputError(f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them.")
+        raise InputError(
+            f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them."
+        )
     url, token, organisation = (os.environ[name] for name in VARIABLES)
     if not re.fullmatch(_URL, url):
         raise InputError(
             "Expected INFLUXDB_V2_URL like http://localhost:8086, without a name or a password. Received: another. Correct it."
         )
     if not (token.isascii() and token.isprintable()):
-        raise InputError("Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: a line break or other characters in it. Copy it again.")
+        raise InputError(
+            "Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: a line break or other characters in it. Copy it again."
+        )
     return url.rstrip("/"), organisation
 
 
@@ -226,7 +306,9 @@ def _parse(answer: bytes) -> tuple[np.ndarray, np.ndarray]:
         table = pyarrow.csv.read_csv(pa.BufferReader(answer), convert_options=convert)
     except pa.ArrowException as error:
         reason = " ".join(str(error).split())[:200]
-        raise InputError(f"Expected a field of numbers. Received: {reason}. Name another field, or see the server's log.") from None
+        raise InputError(
+            f"Expected a field of numbers. Received: {reason}. Name another field, or see the server's log."
+        ) from None
     return table["_time"].cast(pa.int64()).to_numpy(), table["_value"].to_numpy()
 
 

@@ -11,7 +11,9 @@ def to_series(telemetry: Telemetry) -> pd.Series:
     """Converts telemetry to a pandas Series, with a `DatetimeIndex` in UTC, or a `RangeIndex` of sample numbers if it has no times."""
     check_telemetry(telemetry)
     if telemetry.has_time:
-        index = pd.DatetimeIndex(nanoseconds(telemetry).astype("datetime64[ns]"), tz="UTC", name="time")
+        index = pd.DatetimeIndex(
+            nanoseconds(telemetry).astype("datetime64[ns]"), tz="UTC", name="time"
+        )
     else:
         first = round(telemetry.offset_s)
         index = pd.RangeIndex(first, first + len(telemetry), name="sample")

@@ -30,7 +30,9 @@ class PlacedEvent:
         return f"{self.kind} at {self.severity:g} from sample {self.begin} to {self.end}"
 
 
-def in_order(events: Sequence[PlacedEvent], bounds: Sequence[tuple[int, int]], gap: int = 0) -> list[PlacedEvent]:
+def in_order(
+    events: Sequence[PlacedEvent], bounds: Sequence[tuple[int, int]], gap: int = 0
+) -> list[PlacedEvent]:
     """Returns events in the order of time; raises InputError if two are less than `gap` samples apart or one is not within one of the parts.
 
     `bounds` are first sample and end of each part of the series, also of the functions below.
@@ -44,7 +46,9 @@ def in_order(events: Sequence[PlacedEvent], bounds: Sequence[tuple[int, int]], g
             )
     for before, after in itertools.pairwise(ordered):
         if after.begin < before.end + gap:
-            raise InputError(f"Expected events that do not overlap{' or touch' * (gap > 0)}. Received: {before}, and {after}. Move one.")
+            raise InputError(
+                f"Expected events that do not overlap{' or touch' * (gap > 0)}. Received: {before}, and {after}. Move one."
+            )
     return ordered
 
 
@@ -64,7 +68,10 @@ def place_events(
     placed = list(given)
     for kind, severity, length in sorted(drawn, key=lambda each: -each[2]):
         taken = [(event.begin, event.end) for event in placed]
-        tries = (PlacedEvent(kind, severity, draw_begin(bounds, taken, length, gap, rng), length) for _ in range(_TRIES))
+        tries = (
+            PlacedEvent(kind, severity, draw_begin(bounds, taken, length, gap, rng), length)
+            for _ in range(_TRIES)
+        )
         event = next(filter(changes, tries), None)
         if event is None:
             raise InputError(
@@ -75,7 +82,13 @@ def place_events(
     return sorted(placed, key=lambda event: event.begin)
 
 
-def draw_begin(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]], length: int, gap: int, rng: np.random.Generator) -> int:
+def draw_begin(
+    bounds: Sequence[tuple[int, int]],
+    taken: Sequence[tuple[int, int]],
+    length: int,
+    gap: int,
+    rng: np.random.Generator,
+) -> int:
     """Draws the first sample of an event of this length uniformly from all samples at which it fits; raises InputError if there are none.
 
     `taken` are first sample and end of the events that are placed already, and `gap` is the least number of samples between two events.
@@ -83,7 +96,10 @@ def draw_begin(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int
     places = [np.zeros(0, np.int64)]
     for start, stop in bounds:
         begin = start
-        for first, end in [*sorted(each for each in taken if start <= each[0] < stop), (stop + gap, stop)]:
+        for first, end in [
+            *sorted(each for each in taken if start <= each[0] < stop),
+            (stop + gap, stop),
+        ]:
             places.append(np.arange(begin, first - gap - length + 1))
             begin = end + gap
     free = np.concatenate(places)

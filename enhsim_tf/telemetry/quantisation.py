@@ -30,11 +30,15 @@ class Levels:
         """
         levels, counts = _distinct(values)
         often = levels[counts >= _OFTEN]
-        if not 2 <= len(often) <= np.size(values) // 10 or counts[counts >= _OFTEN].sum() < _LEAST_SHARE * np.size(values):
+        if not 2 <= len(often) <= np.size(values) // 10 or counts[
+            counts >= _OFTEN
+        ].sum() < _LEAST_SHARE * np.size(values):
             return None
         step = float(np.diff(often).min())
         multiples = (often - often[0]) / step
-        if np.abs(multiples - np.round(multiples)).max() >= _UNEVEN:  # values of a noise-free wave repeat too, but are not evenly spaced
+        if (
+            np.abs(multiples - np.round(multiples)).max() >= _UNEVEN
+        ):  # values of a noise-free wave repeat too, but are not evenly spaced
             return None
         # float32 values deviate from the grid; the longest distance gives the step most precisely
         steps = round(multiples[-1])
@@ -42,7 +46,10 @@ class Levels:
 
     def round(self, values: np.ndarray) -> np.ndarray:
         """Rounds values to the nearest level, which may lie beyond those that occurred; float32 of the same shape."""
-        return (self.origin + self.step * np.rint((np.asarray(values, np.float64) - self.origin) / self.step)).astype(np.float32)
+        return (
+            self.origin
+            + self.step * np.rint((np.asarray(values, np.float64) - self.origin) / self.step)
+        ).astype(np.float32)
 
 
 def _distinct(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

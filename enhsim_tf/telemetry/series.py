@@ -56,7 +56,9 @@ class Telemetry:
 
     def part(self, start: int, stop: int) -> "Telemetry":
         """The samples from `start` up to, but not including, `stop`, with their times unchanged."""
-        return dataclasses.replace(self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start)
+        return dataclasses.replace(
+            self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start
+        )
 
 
 def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -> np.ndarray:
@@ -77,8 +79,15 @@ def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -
         samples = np.arange(first, len(telemetry) if stop is None else stop)
         start_s, since_s = start.timestamp(), telemetry.offset_s + telemetry.interval_s * samples
     except (ValueError, TypeError, AttributeError, OverflowError):
-        raise InputError(f"Expected start as an ISO 8601 time. Received: {telemetry.start!r}. Correct it.") from None
-    if not max(abs(start_s), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)) < _MAX_S:
+        raise InputError(
+            f"Expected start as an ISO 8601 time. Received: {telemetry.start!r}. Correct it."
+        ) from None
+    if (
+        not max(
+            abs(start_s), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)
+        )
+        < _MAX_S
+    ):
         raise InputError(
             f"Expected times from 1678 to 2261. Received: start={telemetry.start}, offset_s={telemetry.offset_s}. Correct them."
         )
@@ -109,9 +118,13 @@ def check_values(values: np.ndarray, what: str) -> np.ndarray:
     """
     given = values = np.asarray(values)
     if values.ndim != 1:
-        raise InputError(f"Expected one series of shape (samples,). Received: shape {values.shape} from {what}. Name a --column.")
+        raise InputError(
+            f"Expected one series of shape (samples,). Received: shape {values.shape} from {what}. Name a --column."
+        )
     if values.dtype.kind not in "fiu":
-        raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Name a numeric --column.")
+        raise InputError(
+            f"Expected numbers. Received: dtype {values.dtype} from {what}. Name a numeric --column."
+        )
     with np.errstate(over="ignore"):  # values beyond float32 become infinite and are rejected below
         values = values.astype(np.float32)
     bad = np.flatnonzero(~np.isfinite(values))
@@ -121,7 +134,11 @@ def check_values(values: np.ndarray, what: str) -> np.ndarray:
             f"the first ({given[bad[0]]:g}) at sample {bad[0]}. Fill or cut them, or give another unit."
         )
     if len(values) < 2:
-        raise InputError(f"Expected at least 2 samples. Received: {len(values)} from {what}. Give a longer series.")
+        raise InputError(
+            f"Expected at least 2 samples. Received: {len(values)} from {what}. Give a longer series."
+        )
     if np.ptp(values) == 0:
-        raise InputError(f"Expected values that vary. Received: the constant {values[0]:g} in {what}. Choose another channel.")
+        raise InputError(
+            f"Expected values that vary. Received: the constant {values[0]:g} in {what}. Choose another channel."
+        )
     return values

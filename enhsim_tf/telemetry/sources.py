@@ -26,7 +26,12 @@ _NUM_COLUMNS = (25, 55)  # of the published arrays with commands: SMAP, MSL
 Source = str | os.PathLike | Sequence[str | os.PathLike] | pd.DataFrame | pd.Series
 
 
-def read_source(source: Source, columns: Sequence[str] | None = None, time: str | None = None, options: Cleaning | None = None) -> Channels:
+def read_source(
+    source: Source,
+    columns: Sequence[str] | None = None,
+    time: str | None = None,
+    options: Cleaning | None = None,
+) -> Channels:
     """Reads raw channels from a source.
 
     Args:
@@ -50,7 +55,9 @@ def read_source(source: Source, columns: Sequence[str] | None = None, time: str 
         columns = [columns]
     columns = None if columns is None else [str(column) for column in columns]
     if columns is not None and (not columns or len(set(columns)) < len(columns)):
-        raise InputError(f"Expected columns of different names. Received: columns={columns}. Name each once.")
+        raise InputError(
+            f"Expected columns of different names. Received: columns={columns}. Name each once."
+        )
     if isinstance(source, pd.DataFrame | pd.Series):
         return read_table_channels(source, columns, time, options)
     path = existing(source)
@@ -69,11 +76,15 @@ def _read_influx(source: str, columns: list[str] | None, time: str | None) -> Ch
     """Reads the one series at an address, named after its field."""
     if time is not None or columns is not None:
         given = f"time={time!r}" if time is not None else f"columns={columns}"
-        raise InputError(f"Expected {given.partition('=')[0]} with a table only. Received: {given} with {source}. Leave it out.")
+        raise InputError(
+            f"Expected {given.partition('=')[0]} with a table only. Received: {given} with {source}. Leave it out."
+        )
     store = InfluxStore(source)
     times, values = store.read()
     index = pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time")
-    return Channels({store.location.field: pd.Series(values, index=index, name=store.location.field)})
+    return Channels(
+        {store.location.field: pd.Series(values, index=index, name=store.location.field)}
+    )
 
 
 def _read_array(path: Path, columns: list[str] | None, time: str | None) -> Channels:
@@ -84,7 +95,9 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None) -> Chan
     a channel: it would be explained by itself.
     """
     if time not in (None, NO_TIME):
-        raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
+        raise InputError(
+            f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out."
+        )
     try:
         array = np.load(path, allow_pickle=False)  # unpickling could run code
         if not isinstance(array, np.ndarray) or array.dtype.kind in "SUV":
@@ -99,13 +112,21 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None) -> Chan
         )
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
     if columns is None and array.shape[1] > MAX_COLUMNS:
-        raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
-    known, last, found = {str(number): number for number in range(array.shape[1])}, array.shape[1] - 1, {}
+        raise InputError(
+            f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read."
+        )
+    known, last, found = (
+        {str(number): number for number in range(array.shape[1])},
+        array.shape[1] - 1,
+        {},
+    )
     has_layout = array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array) > 0
     has_commands = columns in (None, ["0"]) and has_layout and np.isin(array[:, 1:], (0, 1)).all()
     for column in ["0"] if has_commands else columns or known:
         if column not in known:
-            raise InputError(f"Expected a column of {path.name}, a number from 0 to {last}. Received: {column!r}. Name one of these.")
+            raise InputError(
+                f"Expected a column of {path.name}, a number from 0 to {last}. Received: {column!r}. Name one of these."
+            )
         name = path.stem if last == 0 else f"{path.stem}.{column}"
         found[name] = pd.Series(array[:, known[column]], name=name)
         if has_commands and columns is None:

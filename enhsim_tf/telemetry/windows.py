@@ -19,7 +19,9 @@ def num_window_starts(parts: Sequence[Sized], window: int) -> int:
     return sum(max(0, len(part) - window + 1) for part in parts)
 
 
-def random_window_starts(parts: Sequence[Sized], window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
+def random_window_starts(
+    parts: Sequence[Sized], window: int, num_windows: int, rng: np.random.Generator
+) -> np.ndarray:
     """Draws window starts uniformly from all samples at which a complete window can start, with replacement.
 
     In the paper, the "beginning and end" of windows "are offset by a random amount" (section 2.2).
@@ -42,14 +44,18 @@ def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) 
     return np.unique(np.linspace(0, num_starts - 1, min(num_windows, num_starts)).astype(np.int64))
 
 
-def places_in_parts(parts: Sequence[Sized], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
+def places_in_parts(
+    parts: Sequence[Sized], starts: np.ndarray, window: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns where each window lies: the number of its part, among those that are long enough, and its first sample there."""
     firsts = np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
     which = np.searchsorted(firsts, starts, "right") - 1
     return which, np.asarray(starts) - firsts[which]
 
 
-def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def time_blocks(
+    starts: np.ndarray, num_blocks: int, window: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Splits windows into blocks of time for cross-validation.
 
     Training windows that overlap the time of the held-out block are left out, if at least a quarter of the windows outside
@@ -77,7 +83,9 @@ def runs_of(marks: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
+def mean_over_windows(
+    scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int
+) -> np.ndarray:
     """Converts scores of windows to scores of samples: the mean score of the windows that contain a sample.
 
     Samples after the end of the last window receive the score of the last window. Windows begin at `begins`, in ascending order from 0,

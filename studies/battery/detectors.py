@@ -10,10 +10,23 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.candidates import Training, block_edges, split_fold
 from studies.battery.faults import ALL, Fault, columns_of
 from studies.battery.orbits import ORBIT_SAMPLES
-from studies.battery.record import WINDOW, PairWindows, Runs, coarse_windows, judged_windows, pair_windows, run_key
+from studies.battery.record import (
+    WINDOW,
+    PairWindows,
+    Runs,
+    coarse_windows,
+    judged_windows,
+    pair_windows,
+    run_key,
+)
 from studies.common.detectors import DETECTORS
 
-COARSE, WITH_RESIDUALS, REAL_15, REAL_120 = "coarse", "enhanced + residual windows", "real, 15 orbits", "real, 120 orbits"
+COARSE, WITH_RESIDUALS, REAL_15, REAL_120 = (
+    "coarse",
+    "enhanced + residual windows",
+    "real, 15 orbits",
+    "real, 120 orbits",
+)
 SOURCES = (COARSE, WITH_RESIDUALS, REAL_15, REAL_120)
 """Training data of detectors. The simulator was fitted to 60 orbits; it generates as many orbits as `real, 120 orbits` has. Half of
 the orbits are for training and half for the threshold; of the 15 orbits, two thirds and one third."""
@@ -48,7 +61,9 @@ class Judge:
 
     def _fit(self, rows: Any) -> Callable[[np.ndarray], np.ndarray]:
         pairs = self.pairs
-        training = Training(pairs.coarse[rows], pairs.telemetry[rows][:, :, None], pairs.starts[rows])
+        training = Training(
+            pairs.coarse[rows], pairs.telemetry[rows][:, :, None], pairs.starts[rows]
+        )
         enhancer = training.fit(self.candidate, self.seed)
         return lambda coarse: enhancer.predict(coarse)[:, :, 0]
 
@@ -70,10 +85,14 @@ class Judge:
         run = self.runs[run_key("coarse", "coarse")]
         coarse, num_orbits = coarse_windows(run, 2 * NUM), len(run) // ORBIT_SAMPLES - 1
         # whole residual windows, drawn again
-        noise = self.residuals[np.random.default_rng([self.seed, 1]).integers(0, len(self.residuals), len(coarse))]
+        noise = self.residuals[
+            np.random.default_rng([self.seed, 1]).integers(0, len(self.residuals), len(coarse))
+        ]
         dense = pair_windows(self.runs, "fit", 2 * NUM, self.seed)
         is_early = dense.starts + WINDOW <= (_PART_ORBITS + 1) * ORBIT_SAMPLES
-        fit, more = (pair_windows(self.runs, part, NUM, self.seed).telemetry for part in ("fit", "more"))
+        fit, more = (
+            pair_windows(self.runs, part, NUM, self.seed).telemetry for part in ("fit", "more")
+        )
         return {
             COARSE: _apart(coarse[:, :, 0], 1 / 2, num_orbits),
             WITH_RESIDUALS: _apart(self.enhance(coarse) + noise, 1 / 2, num_orbits),
@@ -87,7 +106,12 @@ class Judge:
         for training, (learnt, held_out) in self.sources().items():
             for name in QUICK:
                 score = DETECTORS[name](self.seed).fit(learnt).score
-                rows += alarm_rows(training, name, score(held_out), {fault: score(each) for fault, each in self.test.items()})
+                rows += alarm_rows(
+                    training,
+                    name,
+                    score(held_out),
+                    {fault: score(each) for fault, each in self.test.items()},
+                )
         return rows
 
     def reference_rows(self) -> Rows:
@@ -97,11 +121,20 @@ class Judge:
             planned = judged_windows(self.runs, fault, self.seed, is_planned=True).coarse
             scores[ENHANCED_RUN][fault] = _rms(telemetry - self.enhance(planned))
             scores[COARSE_RUN][fault] = _rms(telemetry - planned[:, :, 0])
-        fitted = {ENHANCED_RUN: self.residuals, COARSE_RUN: self.pairs.telemetry - self.pairs.coarse[:, :, 0]}
-        return [row for name, each in scores.items() for row in alarm_rows(name, "residual", _rms(fitted[name]), each)]
+        fitted = {
+            ENHANCED_RUN: self.residuals,
+            COARSE_RUN: self.pairs.telemetry - self.pairs.coarse[:, :, 0],
+        }
+        return [
+            row
+            for name, each in scores.items()
+            for row in alarm_rows(name, "residual", _rms(fitted[name]), each)
+        ]
 
 
-def alarm_rows(training: str, detector: str, held_out: np.ndarray, scores: Mapping[Fault | None, np.ndarray]) -> Rows:
+def alarm_rows(
+    training: str, detector: str, held_out: np.ndarray, scores: Mapping[Fault | None, np.ndarray]
+) -> Rows:
     """Judges a detector at the conformal threshold of `RATE` on scores of held-out nominal windows of its training data.
 
     Returns:
@@ -109,7 +142,8 @@ def alarm_rows(training: str, detector: str, held_out: np.ndarray, scores: Mappi
     """
     limit = metrics.threshold(held_out, RATE)
     return [
-        columns_of(fault) | {"training": training, "detector": detector, "alarms": float(np.mean(each > limit))}
+        columns_of(fault)
+        | {"training": training, "detector": detector, "alarms": float(np.mean(each > limit))}
         for fault, each in scores.items()
     ]
 

@@ -25,7 +25,9 @@ FAULT = Fault("raised resistance", 1.0)
 _DIGITS = tuple(zip(COLUMNS, (4, 3, 2), strict=True))
 
 
-def tables(seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int = NUM_FAULT_ORBITS) -> dict[str, pd.DataFrame]:
+def tables(
+    seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int = NUM_FAULT_ORBITS
+) -> dict[str, pd.DataFrame]:
     """Simulates the pair in the gentle regime.
 
     Args:
@@ -41,14 +43,21 @@ def tables(seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int
     """
 
     def in_columns(times: np.ndarray, values: np.ndarray) -> pd.DataFrame:
-        columns = {name: [f"{value:.{digits}f}" for value in column] for (name, digits), column in zip(_DIGITS, values.T, strict=True)}
+        columns = {
+            name: [f"{value:.{digits}f}" for value in column]
+            for (name, digits), column in zip(_DIGITS, values.T, strict=True)
+        }
         return pd.DataFrame({"time": times} | columns)
 
     regime, found = REGIMES["gentle"], {}
     loads, noise = np.random.default_rng([seed, 0]), np.random.default_rng([seed, 1])
     for number, fault, suffix in ((num_orbits, None, ""), (num_fault_orbits, FAULT, "_fault")):
-        load = draw_load(number + 1, regime, loads)  # in the first orbit, which is left out, the battery reaches its usual temperature
-        *planned, runs = simulate_all(load, regime, [fault] if fault is None else [None, fault], onset=2 * ORBIT_SAMPLES)
+        load = draw_load(
+            number + 1, regime, loads
+        )  # in the first orbit, which is left out, the battery reaches its usual temperature
+        *planned, runs = simulate_all(
+            load, regime, [fault] if fault is None else [None, fault], onset=2 * ORBIT_SAMPLES
+        )
         coarse, fine = (run[ORBIT_SAMPLES:] for run in runs)
         times = np.arange(len(coarse)) * int(INTERVAL_S)
         simulator = in_columns(times, coarse)
@@ -56,7 +65,10 @@ def tables(seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int
             found["simulator_planned"] = in_columns(times, planned[0][0][ORBIT_SAMPLES:])
             is_faulty = times >= ORBIT_SAMPLES * INTERVAL_S
             simulator["scenario"] = np.where(is_faulty, fault.kind, "nominal")
-            simulator["severity"], simulator["mask"] = np.where(is_faulty, fault.severity, 0.0), is_faulty.astype(int)
+            simulator["severity"], simulator["mask"] = (
+                np.where(is_faulty, fault.severity, 0.0),
+                is_faulty.astype(int),
+            )
         volts = measure(fine[:, 0], SENSOR_NOISE_V, SENSOR_STEP_V, noise)
         telemetry = pd.DataFrame({"time": times, "volts": [f"{value:.4f}" for value in volts]})
         found |= {f"telemetry{suffix}": telemetry, f"simulator{suffix}": simulator}

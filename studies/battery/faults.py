@@ -28,7 +28,11 @@ class Fault(common.Fault):
 
 ALL = Fault.all()
 """Every fault at every severity."""
-_INPUTS = {"raised resistance": "added resistance", "lost capacity": "lost material", "poor heat transfer": "lost heat transfer"}
+_INPUTS = {
+    "raised resistance": "added resistance",
+    "lost capacity": "lost material",
+    "poor heat transfer": "lost heat transfer",
+}
 
 
 def simulator_inputs(fault: Fault | None) -> dict[str, float]:
@@ -55,10 +59,18 @@ def drift_under(num_samples: int, fault: Fault | None, onset: int) -> np.ndarray
 
 def columns_of(fault: Fault | None) -> dict[str, str | float]:
     """The columns of a table that name a fault."""
-    return {"fault": "nominal" if fault is None else fault.kind, "severity": 0.0 if fault is None else fault.severity}
+    return {
+        "fault": "nominal" if fault is None else fault.kind,
+        "severity": 0.0 if fault is None else fault.severity,
+    }
 
 
-def measure(values: np.ndarray, noise_sd: float | np.ndarray, step: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def measure(
+    values: np.ndarray,
+    noise_sd: float | np.ndarray,
+    step: float | np.ndarray,
+    rng: np.random.Generator,
+) -> np.ndarray:
     """Measures simulated values of any shape: the sensor adds white noise of `noise_sd` and rounds to multiples of `step`, in float32."""
     noisy = values + noise_sd * rng.standard_normal(np.shape(values))
     return (np.rint(noisy / step) * step).astype(np.float32)

@@ -12,10 +12,19 @@ from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, REAL_120, WITH_R
 from studies.common.faults import SEVERITIES
 
 SHOWN: dict[str, tuple[str, dict[str, Any]]] = {
-    ENHANCED_RUN: ("enhanced run as reference", {"color": ENHANCED, "linestyle": "-", "marker": "s"}),
+    ENHANCED_RUN: (
+        "enhanced run as reference",
+        {"color": ENHANCED, "linestyle": "-", "marker": "s"},
+    ),
     COARSE_RUN: ("coarse run as reference", {"color": QUIET, "linestyle": ":", "marker": "D"}),
-    WITH_RESIDUALS: ("detectors trained on enhanced windows", {"color": GENERATED, "linestyle": "--", "marker": "o"}),
-    REAL_120: ("detectors trained on as many real orbits", {"color": REAL, "linestyle": "-", "marker": None}),
+    WITH_RESIDUALS: (
+        "detectors trained on enhanced windows",
+        {"color": GENERATED, "linestyle": "--", "marker": "o"},
+    ),
+    REAL_120: (
+        "detectors trained on as many real orbits",
+        {"color": REAL, "linestyle": "-", "marker": None},
+    ),
 }
 """For each curve its name and its style."""
 
@@ -30,7 +39,9 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         "The enhanced run finds most faults, trained detectors few",
         "Share of windows with an alarm, at thresholds that are set for 1 % false alarms. Means over seeds and detectors; severity 1 is the largest.",
     )
-    grid = panels(figure, down + 0.55, len(regimes), len(kinds), gap=(0.2, 0.12), sharex=True, sharey=True)
+    grid = panels(
+        figure, down + 0.55, len(regimes), len(kinds), gap=(0.2, 0.12), sharex=True, sharey=True
+    )
     for row, (regime, about) in zip(grid, regimes.items(), strict=True):
         for axes, kind in zip(row, kinds, strict=True):
             for use, (label, style) in SHOWN.items():
@@ -46,7 +57,15 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.set_xlabel("severity")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     above = 1 - down / figure.get_size_inches()[1]
-    figure.legend(handles, labels, frameon=False, ncols=2, loc="upper center", bbox_to_anchor=(0.5, above), handlelength=2.6)
+    figure.legend(
+        handles,
+        labels,
+        frameon=False,
+        ncols=2,
+        loc="upper center",
+        bbox_to_anchor=(0.5, above),
+        handlelength=2.6,
+    )
     return figure
 
 

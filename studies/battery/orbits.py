@@ -58,7 +58,9 @@ def draw_load(num_orbits: int, regime: Regime, rng: np.random.Generator) -> np.n
     for orbit in range(num_orbits):
         for _ in range(rng.integers(1, _MOST_PASSES + 1)):
             begin = orbit * ORBIT_SAMPLES + rng.integers(ORBIT_SAMPLES)
-            load[begin : begin + rng.integers(_PASS_SAMPLES[0], _PASS_SAMPLES[1] + 1)] += rng.uniform(*regime.pass_a)
+            load[begin : begin + rng.integers(_PASS_SAMPLES[0], _PASS_SAMPLES[1] + 1)] += (
+                rng.uniform(*regime.pass_a)
+            )
     return load
 
 

@@ -45,7 +45,9 @@ def key_of(fault: Fault | None) -> str:
     return "nominal" if fault is None else f"{fault.kind} {fault.severity:g}"
 
 
-def record(folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, progress: Progress = SILENT) -> None:
+def record(
+    folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, progress: Progress = SILENT
+) -> None:
     """Simulates all runs of a replicate and writes them.
 
     Each part has loads of its own, drawn with the seed. All faults of a part share one load, and begin after its first orbit.
@@ -64,8 +66,14 @@ def record(folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, p
     told = progress.loop("part", len(PARTS))
     for number, (part, (faults, models)) in enumerate(PARTS.items()):
         load = draw_load(counts[part] + 1, regime, np.random.default_rng([seed, number]))
-        for fault, runs in zip(faults, simulate_all(load, regime, faults, [MODELS[name] for name in models]), strict=True):
-            arrays |= {run_key(part, model, fault): run for model, run in zip(models, runs, strict=True)}
+        for fault, runs in zip(
+            faults,
+            simulate_all(load, regime, faults, [MODELS[name] for name in models]),
+            strict=True,
+        ):
+            arrays |= {
+                run_key(part, model, fault): run for model, run in zip(models, runs, strict=True)
+            }
         told(number + 1)
     save_arrays(folder, arrays, "runs")
 
@@ -84,7 +92,14 @@ class PairWindows(NamedTuple):
     starts: np.ndarray
 
 
-def pair_windows(runs: Runs, part: str, number: int, seed: int, fault: Fault | None = None, is_planned: bool = False) -> PairWindows:
+def pair_windows(
+    runs: Runs,
+    part: str,
+    number: int,
+    seed: int,
+    fault: Fault | None = None,
+    is_planned: bool = False,
+) -> PairWindows:
     """Cuts a number of windows of both simulators, spread evenly over the run of a part.
 
     The noise of the sensor depends on the seed, the part and the fault only, so that windows of a run share the noise of their
@@ -94,10 +109,14 @@ def pair_windows(runs: Runs, part: str, number: int, seed: int, fault: Fault | N
     coarse = runs[run_key(part, "coarse", None if is_planned else fault)]
     rng = np.random.default_rng([seed, 0, *f"{part}/{key_of(fault)}".encode()])
     telemetry, starts = measure(fine, SENSOR_NOISE_V, SENSOR_STEP_V, rng), _starts(fine, number)
-    return PairWindows(cut([coarse], starts, WINDOW), cut_windows(telemetry, starts, WINDOW), starts)
+    return PairWindows(
+        cut([coarse], starts, WINDOW), cut_windows(telemetry, starts, WINDOW), starts
+    )
 
 
-def judged_windows(runs: Runs, fault: Fault | None, seed: int, is_planned: bool = False) -> PairWindows:
+def judged_windows(
+    runs: Runs, fault: Fault | None, seed: int, is_planned: bool = False
+) -> PairWindows:
     """Windows of the test orbits, or of a fault, on which detectors are judged; see `pair_windows`."""
     part, number = ("test", NUM_TEST) if fault is None else ("fault", NUM_FAULT)
     return pair_windows(runs, part, number, seed, fault, is_planned)

@@ -33,7 +33,9 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
     return run_study("battery", tables_of, REGIMES, options, settings, out, {"versions": versions})
 
 
-def tables_of_cell(settings: Settings, stages: Stages, regime: str, seed: int, version: str) -> "dict[str, pd.DataFrame]":
+def tables_of_cell(
+    settings: Settings, stages: Stages, regime: str, seed: int, version: str
+) -> "dict[str, pd.DataFrame]":
     """Simulates the runs of one seed in one regime with this version of PyBaMM, and judges detectors on them."""
     import pandas as pd
 
@@ -51,8 +53,17 @@ def tables_of_cell(settings: Settings, stages: Stages, regime: str, seed: int, v
 
         runs = load_arrays(folder, "runs")
         pairs = record.pair_windows(runs, "fit", _NUM_WINDOWS, seed)
-        chosen = choose_enhancer(pairs.coarse, pairs.telemetry[:, :, None], pairs.starts, seed=seed).enhancer.name
+        chosen = choose_enhancer(
+            pairs.coarse, pairs.telemetry[:, :, None], pairs.starts, seed=seed
+        ).enhancer.name
         one = Judge(runs, pairs, chosen, seed)
-        pd.DataFrame(one.source_rows() + one.reference_rows()).assign(regime=regime, seed=seed).to_parquet(found / "alarms.parquet")
+        pd.DataFrame(one.source_rows() + one.reference_rows()).assign(
+            regime=regime, seed=seed
+        ).to_parquet(found / "alarms.parquet")
 
-    return {"alarms": pd.read_parquet(stages.run(f"battery judged {regime} {seed}", judge, (regime, seed), [simulated]) / "alarms.parquet")}
+    return {
+        "alarms": pd.read_parquet(
+            stages.run(f"battery judged {regime} {seed}", judge, (regime, seed), [simulated])
+            / "alarms.parquet"
+        )
+    }

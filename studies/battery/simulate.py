@@ -58,7 +58,10 @@ _TOLERANCES = {"rtol": 1e-4, "atol": 1e-5}
 _VOLTAGE, _TEMPERATURE = "Terminal voltage [V]", "Volume-averaged cell temperature [K]"
 _LIMITS_V = (1.0, 5.5)  # wider than the cell's, so that the solver passes over short excursions
 _KINK_A = 0.2  # where the slope of the current changes by more than this, the solver makes a step
-_REDUCTION, _MOST_REDUCTIONS = 0.9, 8  # after a failure of a solver, the current is multiplied by this, at most so often
+_REDUCTION, _MOST_REDUCTIONS = (
+    0.9,
+    8,
+)  # after a failure of a solver, the current is multiplied by this, at most so often
 
 
 @functools.cache
@@ -81,7 +84,11 @@ def import_pybamm() -> Any:
 
 
 def simulate(
-    model: Model, current: np.ndarray, regime: Regime, faults: Sequence[Fault | None], onset: int = ONSET
+    model: Model,
+    current: np.ndarray,
+    regime: Regime,
+    faults: Sequence[Fault | None],
+    onset: int = ONSET,
 ) -> list[np.ndarray | None]:
     """Runs one simulator over a current, once for each fault.
 
@@ -101,7 +108,16 @@ def simulate(
     pybamm, clock = import_pybamm(), np.arange(len(current)) * INTERVAL_S
     begun = onset * INTERVAL_S
     kinks = clock[np.flatnonzero(np.abs(np.diff(current, 2)) > _KINK_A) + 1]
-    stops = np.unique(np.concatenate([[0.0], kinks, [time_s for time_s in (begun, begun + _ONSET_S) if time_s < clock[-1]], clock[-1:]]))
+    stops = np.unique(
+        np.concatenate(
+            [
+                [0.0],
+                kinks,
+                [time_s for time_s in (begun, begun + _ONSET_S) if time_s < clock[-1]],
+                clock[-1:],
+            ]
+        )
+    )
     simulation, found = _build(model, current, clock, regime, begun), []
     for fault in faults:
         try:
@@ -119,15 +135,21 @@ def simulate(
     return found
 
 
-def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float) -> Any:
+def _build(
+    model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float
+) -> Any:
     """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act from `begun` seconds."""
     pybamm = import_pybamm()
     published = pybamm.ParameterValues("Chen2020")
     values, kelvins = published.copy(), regime.ambient_k if model.follows_ambient else _PUBLISHED_K
     charged = published.copy()
     charged.set_initial_state(FIRST_CHARGE)
-    grown = pybamm.Interpolant(np.array([-1.0, begun, begun + _ONSET_S, 1e12]), np.array([0.0, 0.0, 1.0, 1.0]), pybamm.t)
-    added, material, transfer = (pybamm.InputParameter(name) * grown for name in simulator_inputs(None))
+    grown = pybamm.Interpolant(
+        np.array([-1.0, begun, begun + _ONSET_S, 1e12]), np.array([0.0, 0.0, 1.0, 1.0]), pybamm.t
+    )
+    added, material, transfer = (
+        pybamm.InputParameter(name) * grown for name in simulator_inputs(None)
+    )
     values["Contact resistance [Ohm]"] = model.resistance + added
     for electrode in ("Negative", "Positive"):
         share = f"{electrode} electrode active material volume fraction"
@@ -143,7 +165,12 @@ def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime,
     values["Current function [A]"] = pybamm.Interpolant(clock, current, pybamm.t)
     build = getattr(pybamm.lithium_ion, model.physics)
     return pybamm.Simulation(
-        build({"thermal": "isothermal" if model.is_isothermal else "lumped", "contact resistance": "true"}),
+        build(
+            {
+                "thermal": "isothermal" if model.is_isothermal else "lumped",
+                "contact resistance": "true",
+            }
+        ),
         parameter_values=values,
         solver=pybamm.IDAKLUSolver(**_TOLERANCES, output_variables=[_VOLTAGE, _TEMPERATURE]),
         var_pts=_MESH,
@@ -151,7 +178,11 @@ def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime,
 
 
 def simulate_all(
-    load: np.ndarray, regime: Regime, faults: Sequence[Fault | None], models: Sequence[Model] = (COARSE, VEHICLE), onset: int = ONSET
+    load: np.ndarray,
+    regime: Regime,
+    faults: Sequence[Fault | None],
+    models: Sequence[Model] = (COARSE, VEHICLE),
+    onset: int = ONSET,
 ) -> list[tuple[np.ndarray, ...]]:
     """Runs simulators over a load, once for each fault, driven by the same current; returns for each fault a run of each.
 
@@ -175,14 +206,23 @@ def simulate_all(
             if place not in found:
                 groups.setdefault(current.tobytes(), []).append(place)
         for same in groups.values():
-            current, chosen = currents[same[0]] * _REDUCTION**number, [faults[place] for place in same]
-            runs = zip(*(simulate(model, current, regime, chosen, onset) for model in models), strict=True)
+            current, chosen = (
+                currents[same[0]] * _REDUCTION**number,
+                [faults[place] for place in same],
+            )
+            runs = zip(
+                *(simulate(model, current, regime, chosen, onset) for model in models), strict=True
+            )
             for place, each in zip(same, runs, strict=True):
                 if all(run is not None for run in each):
                     found[place] = each
                 else:
-                    tell(f"a solver failed; the current is reduced to {_REDUCTION ** (number + 1):.2f} of the load's under {faults[place]}")
+                    tell(
+                        f"a solver failed; the current is reduced to {_REDUCTION ** (number + 1):.2f} of the load's under {faults[place]}"
+                    )
         if len(found) == len(faults):
             return [found[place] for place in range(len(faults))]
     failed = next(fault for place, fault in enumerate(faults) if place not in found)
-    raise InputError(f"Expected loads that the solver can follow. Received: a failure of {failed} at any current. Reduce the load.")
+    raise InputError(
+        f"Expected loads that the solver can follow. Received: a failure of {failed} at any current. Reduce the load."
+    )

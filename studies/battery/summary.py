@@ -12,7 +12,12 @@ from studies.common.tables import KeptTables
 if TYPE_CHECKING:
     import pandas as pd
 
-KEPT = KeptTables(("alarms",), labels=("fault", "training", "detector", "regime"), digits=5, command="python -m studies.battery")
+KEPT = KeptTables(
+    ("alarms",),
+    labels=("fault", "training", "detector", "regime"),
+    digits=5,
+    command="python -m studies.battery",
+)
 LARGEST_GAP, LEAST_DETECTORS = 0.02, 5
 """False alarms of detectors trained on enhanced windows with residual windows are within this of those trained on as many real
 orbits, for at least so many detectors."""
@@ -29,7 +34,9 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         "seeds": sorted(set(alarms["seed"].tolist())),
         "regimes": {
             regime: {
-                "uses": {name: _use(of_use) for name, of_use in rows.groupby("training", sort=False)},
+                "uses": {
+                    name: _use(of_use) for name, of_use in rows.groupby("training", sort=False)
+                },
                 "targets": {"alarms": _alarm_target(rows)},
             }
             for regime, rows in alarms.groupby("regime", sort=False)
@@ -47,7 +54,9 @@ def _use(alarms: "pd.DataFrame") -> dict[str, Any]:
     return {
         "false_alarms": mean_interval(nominal.set_index(rows)["alarms"], rows),
         "recall": mean_interval(faulty.groupby(rows)["alarms"].mean(), rows),
-        "by_fault": {kind: by_fault[kind].sort_index().tolist() for kind in dict.fromkeys(faulty["fault"])},
+        "by_fault": {
+            kind: by_fault[kind].sort_index().tolist() for kind in dict.fromkeys(faulty["fault"])
+        },
     }
 
 
@@ -55,4 +64,9 @@ def _alarm_target(alarms: "pd.DataFrame") -> dict[str, Any]:
     rates = alarms[alarms["fault"] == "nominal"].pivot_table("alarms", "detector", "training")
     gaps = (rates[WITH_RESIDUALS] - rates[REAL_120]).dropna().to_dict()
     within = int(np.sum(np.abs(list(gaps.values())) <= LARGEST_GAP))
-    return {"gaps": gaps, "within": within, "of": len(gaps), "is_reached": within >= LEAST_DETECTORS}
+    return {
+        "gaps": gaps,
+        "within": within,
+        "of": len(gaps),
+        "is_reached": within >= LEAST_DETECTORS,
+    }

@@ -35,27 +35,50 @@ class Command:
     def __call__(self, arguments: list[str] | None = None) -> int:
         """Runs the command. An error of the user is reported as one line, with exit code 2."""
         return run_command(
-            lambda: self._run(self._parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them"
+            lambda: self._run(self._parse(arguments)),
+            "interrupted; finished stages are kept, the next run goes on behind them",
         )
 
     def _parse(self, arguments: list[str] | None) -> argparse.Namespace:
         """Reads the command line without slow imports."""
-        parser, own = Parser(prog=f"python -m studies.{self.study}", description=self.description), PUBLISHED / self.study / "results"
+        parser, own = (
+            Parser(prog=f"python -m studies.{self.study}", description=self.description),
+            PUBLISHED / self.study / "results",
+        )
         out_help = f"output folder (default: results/{self.study}; the published tables are in studies/{self.study}/results)"
         parser.add_argument(
-            "--budget", choices=("smoke", "full"), default="full", help="size of the run (default: full, which takes hours)"
+            "--budget",
+            choices=("smoke", "full"),
+            default="full",
+            help="size of the run (default: full, which takes hours)",
         )
-        parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds (default: that of the published tables)")
-        parser.add_argument("--out", type=Path, metavar="DIR", default=Path("results") / self.study, help=out_help)
-        parser.add_argument("--fresh", action="store_true", help="run every stage again instead of using the cache")
-        parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached stages (default: .cache in a checkout)")
+        parser.add_argument(
+            "--seeds",
+            type=int,
+            metavar="N",
+            help="number of seeds (default: that of the published tables)",
+        )
+        parser.add_argument(
+            "--out", type=Path, metavar="DIR", default=Path("results") / self.study, help=out_help
+        )
+        parser.add_argument(
+            "--fresh", action="store_true", help="run every stage again instead of using the cache"
+        )
+        parser.add_argument(
+            "--cache",
+            type=Path,
+            metavar="DIR",
+            help="folder of cached stages (default: .cache in a checkout)",
+        )
         for name, words in self.options.items():
             parser.add_argument(name, **words)
         options = parser.parse_args(arguments)
         if options.seeds is not None and options.seeds < 1:
             raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
         if options.budget == "smoke" and options.out.resolve() == own:
-            raise InputError(f"Expected another folder for a smoke run than that of the published tables. Received: --out {options.out}.")
+            raise InputError(
+                f"Expected another folder for a smoke run than that of the published tables. Received: --out {options.out}."
+            )
         return options
 
     def _run(self, options: argparse.Namespace) -> int:
@@ -75,7 +98,12 @@ class Command:
 
 def environment_option(names: Iterable[str]) -> dict[str, dict[str, Any]]:
     """The option `--environment` of a study with these kinds of noise."""
-    return {"--environment": {"choices": tuple(names), "help": "run with this kind of noise only (default: all)"}}
+    return {
+        "--environment": {
+            "choices": tuple(names),
+            "help": "run with this kind of noise only (default: all)",
+        }
+    }
 
 
 def environments(options: argparse.Namespace, names: Iterable[str]) -> tuple[str, ...]:
@@ -83,7 +111,12 @@ def environments(options: argparse.Namespace, names: Iterable[str]) -> tuple[str
     return tuple(names) if options.environment is None else (options.environment,)
 
 
-def example_command(study: str, what: str, tables: "Callable[[], Mapping[str, pd.DataFrame]]", arguments: list[str] | None = None) -> int:
+def example_command(
+    study: str,
+    what: str,
+    tables: "Callable[[], Mapping[str, pd.DataFrame]]",
+    arguments: list[str] | None = None,
+) -> int:
     """The command `python -m studies.STUDY.example`, which writes the recorded pair that ships with the project.
 
     Args:
@@ -99,7 +132,10 @@ def example_command(study: str, what: str, tables: "Callable[[], Mapping[str, pd
     def run() -> int:
         from enhsim_tf.common.atomic_files import make_folder, replace_file
 
-        parser = Parser(prog=f"python -m studies.{study}.example", description=f"Writes the recorded pair of the {what}.")
+        parser = Parser(
+            prog=f"python -m studies.{study}.example",
+            description=f"Writes the recorded pair of the {what}.",
+        )
         parser.add_argument("folder", type=Path, help=f"the output folder, such as examples/{what}")
         folder = make_folder(parser.parse_args(arguments).folder)
         for name, table in tables().items():

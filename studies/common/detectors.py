@@ -26,7 +26,9 @@ class Detector(Protocol):
 
 def features(windows: np.ndarray) -> np.ndarray:
     """The features of `window_features` of each channel."""
-    return window_features(windows.swapaxes(1, -1).reshape(-1, windows.shape[1])).reshape(len(windows), -1)
+    return window_features(windows.swapaxes(1, -1).reshape(-1, windows.shape[1])).reshape(
+        len(windows), -1
+    )
 
 
 class IsolationForestOnFeatures:
@@ -39,7 +41,9 @@ class IsolationForestOnFeatures:
         """Fits the forest to nominal windows."""
         from sklearn.ensemble import IsolationForest
 
-        self._forest = IsolationForest(n_estimators=200, random_state=self.seed).fit(features(windows))
+        self._forest = IsolationForest(n_estimators=200, random_state=self.seed).fit(
+            features(windows)
+        )
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -57,8 +61,12 @@ class NearestNeighbours:
         """Stores the nominal windows."""
         from sklearn.neighbors import NearestNeighbors
 
-        self._index = NearestNeighbors(n_neighbors=min(self.num_neighbours, len(windows)), algorithm="brute")
-        self._mean = np.mean(windows, dtype=np.float64)  # subtracted, because a large offset would reduce the precision of the distances
+        self._index = NearestNeighbors(
+            n_neighbors=min(self.num_neighbours, len(windows)), algorithm="brute"
+        )
+        self._mean = np.mean(
+            windows, dtype=np.float64
+        )  # subtracted, because a large offset would reduce the precision of the distances
         self._index.fit(flat(windows) - self._mean)
         return self
 
@@ -78,7 +86,9 @@ class OneClassSVMOnFeatures:
         from sklearn.svm import OneClassSVM
 
         with threadpool_limits(1):
-            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=0.01)).fit(features(windows))
+            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=0.01)).fit(
+                features(windows)
+            )
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -102,7 +112,15 @@ class _Autoencoder:
         windows = flat(windows)
         self._mean, self._scale = np.mean(windows), np.std(windows)
         self._network, scaled = self._build(windows.shape[1]), self._scaled(windows)
-        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, learning_rate=self.learning_rate)
+        fit_windows(
+            self._network,
+            scaled,
+            scaled,
+            self.epochs,
+            batch_size=32,
+            seed=self.seed,
+            learning_rate=self.learning_rate,
+        )
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -138,8 +156,13 @@ class ConvolutionalAutoencoder(_Autoencoder):
         from enhsim_tf.common.backend import keras
         from studies.common.training import seeded_initialiser
 
-        missing = -samples % 16  # number of zeros that are appended to a window and removed from the output
-        layers, kernels = keras.layers, [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)]
+        missing = (
+            -samples % 16
+        )  # number of zeros that are appended to a window and removed from the output
+        layers, kernels = (
+            keras.layers,
+            [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)],
+        )
         options = {"kernel_size": 9, "strides": 4, "padding": "same"}
         return keras.Sequential(
             [
@@ -148,7 +171,9 @@ class ConvolutionalAutoencoder(_Autoencoder):
                 layers.ZeroPadding1D((0, missing)),
                 layers.Conv1D(16, activation="relu", kernel_initializer=kernels[0], **options),
                 layers.Conv1D(4, kernel_initializer=kernels[1], **options),
-                layers.Conv1DTranspose(16, activation="relu", kernel_initializer=kernels[2], **options),
+                layers.Conv1DTranspose(
+                    16, activation="relu", kernel_initializer=kernels[2], **options
+                ),
                 layers.Conv1DTranspose(1, kernel_initializer=kernels[3], **options),
                 layers.Cropping1D((0, missing)),
                 layers.Reshape((samples,)),

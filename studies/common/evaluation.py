@@ -64,7 +64,14 @@ def make_trial(
     for kind in INJECTIONS:
         for severity in SEVERITIES:
             parts = [
-                inject(chosen[number :: len(durations)], kind, severity, duration, noise_sd, np.random.default_rng([seed, number]))[0]
+                inject(
+                    chosen[number :: len(durations)],
+                    kind,
+                    severity,
+                    duration,
+                    noise_sd,
+                    np.random.default_rng([seed, number]),
+                )[0]
                 for number, duration in enumerate(durations)
             ]
             anomalous[kind, severity] = np.concatenate(parts)
@@ -97,9 +104,18 @@ def evaluate_arm(
         limit = threshold(detector.score(held_out), trial.rate)
         nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
         for block, scores in enumerate(np.array_split(nominal, _NUM_BLOCKS)):
-            tables["alarms"].append({"detector": name, "block": block, "alarms": int(np.sum(scores > limit)), "windows": len(scores)})
+            tables["alarms"].append(
+                {
+                    "detector": name,
+                    "block": block,
+                    "alarms": int(np.sum(scores > limit)),
+                    "windows": len(scores),
+                }
+            )
         all_scores = detector.score(np.concatenate(list(trial.anomalous.values())))
-        parts = np.split(all_scores, np.cumsum([len(windows) for windows in trial.anomalous.values()])[:-1])
+        parts = np.split(
+            all_scores, np.cumsum([len(windows) for windows in trial.anomalous.values()])[:-1]
+        )
         for (kind, severity), scores in zip(trial.anomalous, parts, strict=True):
             tables["recall"].append(
                 {
@@ -113,7 +129,9 @@ def evaluate_arm(
     return tables
 
 
-def cross_fitted_scores(make: Callable[[], Detector], windows: np.ndarray, starts: np.ndarray, num_folds: int) -> np.ndarray:
+def cross_fitted_scores(
+    make: Callable[[], Detector], windows: np.ndarray, starts: np.ndarray, num_folds: int
+) -> np.ndarray:
     """Scores windows by detectors that were fitted to other blocks of time, which share no sample with them.
 
     Args:

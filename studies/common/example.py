@@ -33,7 +33,10 @@ def draw_noise(kind: str, signal: np.ndarray, sd: float, rng: np.random.Generato
 
 def coarse_simulator(settings: of_paper.Settings) -> SquareWaveSimulator:
     """The simulator of the example."""
-    waves = ((settings.orbit_period, settings.orbit_amplitude), (settings.rotation_period, settings.rotation_amplitude))
+    waves = (
+        (settings.orbit_period, settings.orbit_amplitude),
+        (settings.rotation_period, settings.rotation_amplitude),
+    )
     return SquareWaveSimulator([SquareWave(period, low=-size, high=size) for period, size in waves])
 
 
@@ -67,4 +70,6 @@ class Example(Pipeline):
     def train(self) -> Telemetry:
         """The training part, as the tool takes it."""
         part = self.parts["train"]
-        return Telemetry(part.values, part.interval, name=part.name, offset_s=part.interval * part.first)
+        return Telemetry(
+            part.values, part.interval, name=part.name, offset_s=part.interval * part.first
+        )

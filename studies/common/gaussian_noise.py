@@ -13,7 +13,9 @@ CANDIDATES = (NONE, "gaussian", "autoregression", RESIDUAL_WINDOWS, MATCHED)
 _MOST_ORDER = 200  # of the autoregression
 
 
-def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> "GaussianNoise | WindowBootstrap":
+def fit_candidate(
+    name: str, noise: np.ndarray, signal: np.ndarray
+) -> "GaussianNoise | WindowBootstrap":
     """Fits one of `CANDIDATES` to windows of noise and the enhanced signal below them, both of shape `(windows, samples, channels)`."""
     if name == "gaussian":
         return GaussianNoise.fit(noise)
@@ -31,36 +33,61 @@ class GaussianNoise:
         processes: The autoregression of each channel, of which the mixed draws are the innovations. Empty: the noise is white.
     """
 
-    def __init__(self, root: np.ndarray, window: int, processes: "Sequence[GaussianAutoregression]" = ()):
-        self.root, self.window, self.processes = np.asarray(root, np.float64), int(window), tuple(processes)
+    def __init__(
+        self, root: np.ndarray, window: int, processes: "Sequence[GaussianAutoregression]" = ()
+    ):
+        self.root, self.window, self.processes = (
+            np.asarray(root, np.float64),
+            int(window),
+            tuple(processes),
+        )
 
     @classmethod
     def fit(cls, windows: np.ndarray) -> "GaussianNoise":
         """Fits white noise to windows of noise of shape `(windows, samples, channels)`."""
-        return cls(_root(np.cov(windows.reshape(-1, windows.shape[2]), rowvar=False, bias=True)), windows.shape[1])
+        return cls(
+            _root(np.cov(windows.reshape(-1, windows.shape[2]), rowvar=False, bias=True)),
+            windows.shape[1],
+        )
 
     @classmethod
     def fit_autoregressions(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianNoise":
         """Fits an autoregression to each channel, see `GaussianAutoregression.fit`, and the correlation of their innovations."""
         from scipy.signal import lfilter
 
-        found = [GaussianAutoregression.fit(windows[:, :, channel], max_order) for channel in range(windows.shape[2])]
+        found = [
+            GaussianAutoregression.fit(windows[:, :, channel], max_order)
+            for channel in range(windows.shape[2])
+        ]
         most = max(len(each.coefficients) for each in found)
-        left = [lfilter([1.0, *-each.coefficients], [1.0], windows[:, :, k], axis=1)[:, most:].ravel() for k, each in enumerate(found)]
+        left = [
+            lfilter([1.0, *-each.coefficients], [1.0], windows[:, :, k], axis=1)[:, most:].ravel()
+            for k, each in enumerate(found)
+        ]
         return cls(_root(np.corrcoef(left)), windows.shape[1], found)
 
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+    def generate(
+        self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None
+    ) -> np.ndarray:
         """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no effect."""
         return self._draw((number, self.window), rng)
 
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+    def generate_series(
+        self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None
+    ) -> np.ndarray:
         """Draws one series of any length, float32 of shape `(num_samples, channels)`. The signal has no effect."""
         return self._draw((1, num_samples), rng)[0]
 
     def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
         draws = rng.standard_normal((*shape, len(self.root))) @ self.root.T
         if self.processes:
-            draws = np.stack([each.filtered(draws[:, :, channel]) for channel, each in enumerate(self.processes)], axis=2)
+            draws = np.stack(
+                [
+                    each.filtered(draws[:, :, channel])
+                    for channel, each in enumerate(self.processes)
+                ],
+                axis=2,
+            )
         return draws.astype(np.float32)
 
 
@@ -82,9 +109,14 @@ class GaussianAutoregression:
     """
 
     def __init__(self, coefficients: Sequence[float], innovation_sd: float):
-        self.coefficients, self.innovation_sd = np.asarray(coefficients, np.float64), float(innovation_sd)
+        self.coefficients, self.innovation_sd = (
+            np.asarray(coefficients, np.float64),
+            float(innovation_sd),
+        )
         if not self.innovation_sd >= 0:
-            raise InputError(f"Expected innovations with a standard deviation of 0 or more. Received: {self.innovation_sd}.")
+            raise InputError(
+                f"Expected innovations with a standard deviation of 0 or more. Received: {self.innovation_sd}."
+            )
         self._start = _lower_orders(self.coefficients, self.innovation_sd)
 
     @classmethod
@@ -118,9 +150,14 @@ class GaussianAutoregression:
         from scipy.signal import lfilter
 
         shape = draws.shape
-        innovations, whitening = self.innovation_sd * draws, np.concatenate([[1.0], -self.coefficients])
+        innovations, whitening = (
+            self.innovation_sd * draws,
+            np.concatenate([[1.0], -self.coefficients]),
+        )
         start = np.zeros((shape[0], min(len(self.coefficients), shape[1])))
-        for place in range(start.shape[1]):  # each of the first samples is predicted from all earlier ones
+        for place in range(
+            start.shape[1]
+        ):  # each of the first samples is predicted from all earlier ones
             past, sd = self._start[place]
             start[:, place] = start[:, :place][:, ::-1] @ past + sd * draws[:, place]
         if start.size:  # the innovations for which the filter returns these first samples

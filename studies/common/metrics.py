@@ -10,7 +10,9 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.metrics import recall, threshold
 
 
-def recall_at_real_rate(real_scores: np.ndarray, anomalous_scores: np.ndarray, rate: float = 0.01) -> float:
+def recall_at_real_rate(
+    real_scores: np.ndarray, anomalous_scores: np.ndarray, rate: float = 0.01
+) -> float:
     """Computes the recall at the real rate, that is at a threshold that is set on real nominal windows.
 
     This recall measures how well a detector separates nominal from anomalous windows. It does not depend on the threshold
@@ -53,7 +55,13 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int) -> float:
         InputError: If no sample is anomalous, if a score is NaN, if the shapes differ, or if `max_buffer` is negative.
     """
     labels, scores = np.asarray(labels, bool), np.asarray(scores, np.float64)
-    if labels.shape != scores.shape or labels.ndim != 1 or not labels.any() or np.isnan(scores).any() or max_buffer < 0:
+    if (
+        labels.shape != scores.shape
+        or labels.ndim != 1
+        or not labels.any()
+        or np.isnan(scores).any()
+        or max_buffer < 0
+    ):
         raise InputError(
             "Expected labels and scores of one shape (samples,), an anomalous sample, no nan and a buffer of 0 or more. "
             f"Received: shapes {labels.shape} and {scores.shape}, {labels.sum()} anomalous, {np.isnan(scores).sum()} nan, "
@@ -61,10 +69,15 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int) -> float:
         )
     order, last = _thresholds(scores)
     alarms = last + 1
-    group = np.empty(len(scores), int)  # for each sample, the index of the first threshold at which it raises an alarm
+    group = np.empty(
+        len(scores), int
+    )  # for each sample, the index of the first threshold at which it raises an alarm
     group[order] = np.searchsorted(last, np.arange(len(scores)))
     core = np.cumsum(labels[order])[last]
-    distance, edges = _distance(labels), np.flatnonzero(np.diff(labels, prepend=False, append=False)).reshape(-1, 2)
+    distance, edges = (
+        _distance(labels),
+        np.flatnonzero(np.diff(labels, prepend=False, append=False)).reshape(-1, 2),
+    )
     areas = []
     for length in range(max_buffer + 1):
         half = length // 2

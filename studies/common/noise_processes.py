@@ -32,18 +32,31 @@ def first_order(number: int, coefficient: float, rng: np.random.Generator) -> np
     return lfilter([1.0], [1.0, -coefficient], draws)
 
 
-def white(number: int, rng: np.random.Generator, signal: Signal = None, sd: float = 0.1) -> np.ndarray:
+def white(
+    number: int, rng: np.random.Generator, signal: Signal = None, sd: float = 0.1
+) -> np.ndarray:
     """Independent Gaussian noise."""
     return rng.normal(0.0, sd, number)
 
 
-def autoregressive(number: int, rng: np.random.Generator, signal: Signal = None, coefficient: float = 0.7, sd: float = 0.1) -> np.ndarray:
+def autoregressive(
+    number: int,
+    rng: np.random.Generator,
+    signal: Signal = None,
+    coefficient: float = 0.7,
+    sd: float = 0.1,
+) -> np.ndarray:
     """Gaussian AR(1) noise: each sample is `coefficient` times the last one plus an independent draw."""
     return sd * first_order(number, coefficient, rng)
 
 
 def heteroscedastic(
-    number: int, rng: np.random.Generator, signal: Signal = None, log_scale_sd: float = 0.8, sd: float = 0.1, correlation: float = 2_000.0
+    number: int,
+    rng: np.random.Generator,
+    signal: Signal = None,
+    log_scale_sd: float = 0.8,
+    sd: float = 0.1,
+    correlation: float = 2_000.0,
 ) -> np.ndarray:
     """Gaussian noise whose logarithm of scale is a slow Gaussian process (Ornstein-Uhlenbeck), with 1 / e left after `correlation`."""
     log_scale = log_scale_sd * first_order(number, np.exp(-1 / correlation), rng)
@@ -52,7 +65,12 @@ def heteroscedastic(
 
 
 def shot(
-    number: int, rng: np.random.Generator, signal: Signal = None, rate: float = 0.01, amplitude: float = 0.5, background_sd: float = _HALF
+    number: int,
+    rng: np.random.Generator,
+    signal: Signal = None,
+    rate: float = 0.01,
+    amplitude: float = 0.5,
+    background_sd: float = _HALF,
 ) -> np.ndarray:
     """Poisson pulses of one sample, `rate` a sample, with exponential heights of mean `amplitude`, less their mean, on white noise."""
     places = rng.integers(0, number, rng.poisson(rate * number))
@@ -60,7 +78,13 @@ def shot(
     return pulses - rate * amplitude + rng.normal(0.0, background_sd, number)
 
 
-def fractional(number: int, rng: np.random.Generator, signal: Signal = None, hurst: float = 0.8, sd: float = 0.1) -> np.ndarray:
+def fractional(
+    number: int,
+    rng: np.random.Generator,
+    signal: Signal = None,
+    hurst: float = 0.8,
+    sd: float = 0.1,
+) -> np.ndarray:
     """The increments of fractional Brownian motion: long memory for a `hurst` exponent above 0.5, white at 0.5.
 
     They are drawn exactly, by circulant embedding (Davies and Harte 1987).
@@ -69,13 +93,19 @@ def fractional(number: int, rng: np.random.Generator, signal: Signal = None, hur
 
     half = next_fast_len(number)
     lag = np.arange(1, half + 1, dtype=np.float64)
-    with np.errstate(divide="ignore"):  # log(1 - 1) at lag 1 is minus infinity, and its exponential zero
+    with np.errstate(
+        divide="ignore"
+    ):  # log(1 - 1) at lag 1 is minus infinity, and its exponential zero
         # second differences of lag^(2 hurst) in a form that keeps their digits
         bend = np.expm1(2 * hurst * np.log1p(1 / lag)) + np.expm1(2 * hurst * np.log1p(-1 / lag))
     covariance = np.concatenate([[1.0], 0.5 * lag ** (2 * hurst) * bend])
-    power = np.maximum(rfft(np.concatenate([covariance, covariance[-2:0:-1]])).real, 0)  # below zero by rounding only
+    power = np.maximum(
+        rfft(np.concatenate([covariance, covariance[-2:0:-1]])).real, 0
+    )  # below zero by rounding only
     spectrum = rng.standard_normal(half + 1) + 1j * rng.standard_normal(half + 1)
-    spectrum[[0, -1]] = np.sqrt(2) * spectrum[[0, -1]].real  # real at frequencies that are their own mirror image
+    spectrum[[0, -1]] = (
+        np.sqrt(2) * spectrum[[0, -1]].real
+    )  # real at frequencies that are their own mirror image
     return sd * irfft(np.sqrt(half * power) * spectrum, 2 * half)[:number]
 
 
@@ -92,7 +122,13 @@ def bernoulli(
     return rng.normal(0.0, np.sqrt(background_sd**2 + has_impulse * impulse_sd**2))
 
 
-def one_over_f(number: int, rng: np.random.Generator, signal: Signal = None, longest: float = 4_000.0, sd: float = 0.1) -> np.ndarray:
+def one_over_f(
+    number: int,
+    rng: np.random.Generator,
+    signal: Signal = None,
+    longest: float = 4_000.0,
+    sd: float = 0.1,
+) -> np.ndarray:
     """Gaussian noise whose power falls with the frequency (flicker noise), and is flat below that of the period `longest`."""
     from scipy.fft import irfft, next_fast_len, rfftfreq
 
@@ -101,7 +137,9 @@ def one_over_f(number: int, rng: np.random.Generator, signal: Signal = None, lon
     length = next_fast_len(number + 2 * int(longest), real=True)
     amplitude = np.maximum(rfftfreq(length), 1 / longest) ** -0.5
     amplitude[0] = 0
-    spectrum = amplitude * (rng.standard_normal(len(amplitude)) + 1j * rng.standard_normal(len(amplitude)))
+    spectrum = amplitude * (
+        rng.standard_normal(len(amplitude)) + 1j * rng.standard_normal(len(amplitude))
+    )
     # irfft divides by the length and counts each frequency twice: the variance of the series is 4 * sum(a^2) / length^2.
     return sd / (2 * np.sqrt(np.sum(amplitude**2)) / length) * irfft(spectrum, length)[:number]
 
@@ -112,19 +150,29 @@ def interference(number: int, rng: np.random.Generator, signal: Signal = None) -
     return 0.1 * np.sin(phase) + rng.normal(0, _HALF, number)
 
 
-def telegraph(number: int, rng: np.random.Generator, signal: Signal = None, dwell: float = 300.0) -> np.ndarray:
+def telegraph(
+    number: int, rng: np.random.Generator, signal: Signal = None, dwell: float = 300.0
+) -> np.ndarray:
     """A level that jumps between two values after random, exponentially distributed times of mean `dwell`, on white noise."""
     changes = rng.random(number) < 1 / dwell
     level = (rng.integers(2) + np.cumsum(changes)) % 2
     return 2 * _HALF * (level - 0.5) + rng.normal(0, _HALF, number)
 
 
-def quantised(number: int, rng: np.random.Generator, signal: Signal = None, step: float = 0.05) -> np.ndarray:
+def quantised(
+    number: int, rng: np.random.Generator, signal: Signal = None, step: float = 0.05
+) -> np.ndarray:
     """Gaussian AR(1) noise, rounded to multiples of a step, as an analogue-to-digital converter does."""
     return step * np.rint(0.1 * first_order(number, 0.8, rng) / step)
 
 
-def bursts(number: int, rng: np.random.Generator, signal: Signal = None, gap: float = 360.0, burst: float = 40.0) -> np.ndarray:
+def bursts(
+    number: int,
+    rng: np.random.Generator,
+    signal: Signal = None,
+    gap: float = 360.0,
+    burst: float = 40.0,
+) -> np.ndarray:
     """White noise that is louder during bursts, which begin and end at random (a Markov chain of two states with mean times)."""
     ends = 1 / np.array([gap, burst])
     num_pairs = 10 + int(2 * number / (burst + gap))
@@ -133,10 +181,18 @@ def bursts(number: int, rng: np.random.Generator, signal: Signal = None, gap: fl
         lengths = np.concatenate([lengths, rng.geometric(np.tile(ends, num_pairs))])
     is_burst = np.repeat(np.arange(len(lengths)) % 2 == 1, lengths)
     begin = rng.integers(number)  # by then the chain has forgotten its first state
-    return rng.standard_normal(number) * np.where(is_burst[begin : begin + number], np.sqrt(0.055), _HALF)
+    return rng.standard_normal(number) * np.where(
+        is_burst[begin : begin + number], np.sqrt(0.055), _HALF
+    )
 
 
-def heavy_tails(number: int, rng: np.random.Generator, signal: Signal = None, degrees: float = 3.0, sd: float = 0.1) -> np.ndarray:
+def heavy_tails(
+    number: int,
+    rng: np.random.Generator,
+    signal: Signal = None,
+    degrees: float = 3.0,
+    sd: float = 0.1,
+) -> np.ndarray:
     """AR(1) noise whose innovations have Student's t distribution: large values are not rare, and they ring."""
     from scipy.signal import lfilter
 
@@ -150,13 +206,17 @@ def loudness(number: int, rng: np.random.Generator, signal: Signal = None) -> np
     """White noise and a coloured component (AR(1)) whose loudness varies slowly."""
     log_scale_sd = 0.6
     log_scale = log_scale_sd * first_order(number, np.exp(-1 / 1_000.0), rng)
-    return _HALF * np.exp(log_scale - log_scale_sd**2) * first_order(number, 0.9, rng) + rng.normal(0, _HALF, number)
+    return _HALF * np.exp(log_scale - log_scale_sd**2) * first_order(number, 0.9, rng) + rng.normal(
+        0, _HALF, number
+    )
 
 
 def signal_dependent(number: int, rng: np.random.Generator, signal: Signal = None) -> np.ndarray:
     """White noise whose scale follows the signal, for example of a sensor with an error of gain."""
     if signal is None or np.shape(signal) != (number,):
-        raise ValueError(f"Expected a signal of {number} samples. Received: one of shape {np.shape(signal)}.")
+        raise ValueError(
+            f"Expected a signal of {number} samples. Received: one of shape {np.shape(signal)}."
+        )
     slope = float(np.sqrt(0.0075) / _SIGNAL_SD)
     return rng.standard_normal(number) * np.hypot(0.05, slope * np.asarray(signal, np.float64))
 
@@ -174,11 +234,15 @@ GALLERY = {
     "heteroscedastic": NoiseProcess(heteroscedastic),
     "shot": NoiseProcess(shot),
     "fractional": NoiseProcess(fractional),
-    "bernoulli": NoiseProcess(bernoulli, float(np.sqrt(0.01 * (10 * _HALF) ** 2 + _HALF**2))),  # 0.1 but for its last digit
+    "bernoulli": NoiseProcess(
+        bernoulli, float(np.sqrt(0.01 * (10 * _HALF) ** 2 + _HALF**2))
+    ),  # 0.1 but for its last digit
     "one_over_f": NoiseProcess(one_over_f),
     "interference": NoiseProcess(interference),
     "telegraph": NoiseProcess(telegraph),
-    "quantised": NoiseProcess(quantised, float(np.sqrt(0.1**2 + 0.05**2 / 12))),  # by Sheppard's correction
+    "quantised": NoiseProcess(
+        quantised, float(np.sqrt(0.1**2 + 0.05**2 / 12))
+    ),  # by Sheppard's correction
     "bursts": NoiseProcess(bursts),
     "heavy_tails": NoiseProcess(heavy_tails),
     "loudness": NoiseProcess(loudness),

@@ -17,7 +17,13 @@ class PaperGAN:
         on_record: Called with the iteration at each record.
     """
 
-    def __init__(self, noise: np.ndarray, settings: Settings, unit: float = 1.0, on_record: Callable[[int], None] = lambda iteration: None):
+    def __init__(
+        self,
+        noise: np.ndarray,
+        settings: Settings,
+        unit: float = 1.0,
+        on_record: Callable[[int], None] = lambda iteration: None,
+    ):
         from enhsim_tf.paper.noise import NoiseGAN, build_discriminator, build_generator, train_gan
 
         self.settings, self.unit = settings, unit

@@ -46,9 +46,13 @@ def run_study(
     """
     import pandas as pd
 
-    summary, figure = (importlib.import_module(f"studies.{study}.{name}") for name in ("summary", "figure"))
+    summary, figure = (
+        importlib.import_module(f"studies.{study}.{name}") for name in ("summary", "figure")
+    )
     group, names, parts, began = getattr(settings, study), tuple(names), {}, time.monotonic()
-    replicates = [(name, group.first_seed + number) for number in range(group.num_seeds) for name in names]
+    replicates = [
+        (name, group.first_seed + number) for number in range(group.num_seeds) for name in names
+    ]
     for number, (name, seed) in enumerate(replicates, 1):
         tell(f"replicate {number} of {len(replicates)}: {name}, seed {seed}")
         stages = Stages(options.cache, options.fresh, tell, speaks=not sys.stdout.isatty())
@@ -58,7 +62,9 @@ def run_study(
         from enhsim_tf.common.backend import keras
 
         keras.backend.clear_session()  # frees the memory of the replicate's networks
-    summary.KEPT.write({name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}, out)
+    summary.KEPT.write(
+        {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}, out
+    )
     about = about or {}
     found = summary.summarise(summary.KEPT.read(out))
     found |= {"budget": settings.budget, **about, "versions": VERSIONS | about.get("versions", {})}
@@ -67,7 +73,13 @@ def run_study(
     return found
 
 
-def save_all(figures: Mapping[str, Figure], found: Mapping[str, Any], folder: Path, command: str) -> list[Path]:
+def save_all(
+    figures: Mapping[str, Figure], found: Mapping[str, Any], folder: Path, command: str
+) -> list[Path]:
     """Draws the figures of a study by name from its findings, with its command as the caption, and returns the files in the folder."""
     is_smoke = found["budget"] == "smoke"
-    return [path for name, figure in figures.items() for path in save(figure, name, found, folder, command, is_smoke)]
+    return [
+        path
+        for name, figure in figures.items()
+        for path in save(figure, name, found, folder, command, is_smoke)
+    ]

@@ -23,24 +23,45 @@ class RobustnessSettings:
     """The study of robustness: `python -m studies.robustness`."""
 
     num_seeds: int = setting(5, "seeds: four kinds of noise with each", smoke=2)
-    first_seed: int = setting(0, "seed: the seeds of the study of readings, whose networks are the same with white noise")
-    num_windows: int = setting(1_000, "windows: training windows of each arm; as many held-out windows set its threshold", smoke=200)
+    first_seed: int = setting(
+        0, "seed: the seeds of the study of readings, whose networks are the same with white noise"
+    )
+    num_windows: int = setting(
+        1_000,
+        "windows: training windows of each arm; as many held-out windows set its threshold",
+        smoke=200,
+    )
     num_anomalous: int = setting(
-        150, "windows: anomalous windows of each kind and severity, the same places for all kinds, severities and arms", smoke=6
+        150,
+        "windows: anomalous windows of each kind and severity, the same places for all kinds, severities and arms",
+        smoke=6,
     )
     num_resplits: int = setting(
-        40, "re-splits: maximum number of resamples for the real-vs-real baseline; fewer for expensive measures", smoke=5
+        40,
+        "re-splits: maximum number of resamples for the real-vs-real baseline; fewer for expensive measures",
+        smoke=5,
     )
-    false_alarm_rate: float = setting(0.01, "share: target rate of each threshold, on held-out windows of the training arm")
+    false_alarm_rate: float = setting(
+        0.01, "share: target rate of each threshold, on held-out windows of the training arm"
+    )
 
 
 @dataclasses.dataclass(frozen=True)
 class SecondSettings:
     """The residual pipeline of the factorial study: noise is the residual of the enhancer."""
 
-    num_windows: int = setting(15_000, "windows: more windows, so that the enhancer does not memorise their noise", smoke=60)
-    epochs: int = setting(2, "epochs: fewer epochs: half the paper's steps, with a decaying learning rate")
-    held_out: float = setting(0.0, "share: kept for the keys of finished runs; coarse windows repeat, so no windows need to be held out")
+    num_windows: int = setting(
+        15_000,
+        "windows: more windows, so that the enhancer does not memorise their noise",
+        smoke=60,
+    )
+    epochs: int = setting(
+        2, "epochs: fewer epochs: half the paper's steps, with a decaying learning rate"
+    )
+    held_out: float = setting(
+        0.0,
+        "share: kept for the keys of finished runs; coarse windows repeat, so no windows need to be held out",
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,7 +69,9 @@ class ModesSettings:
     """The detailed test of degraded modes, a part of the study of robustness."""
 
     num_windows: int = setting(300, "windows: test windows in each mode at each severity", smoke=40)
-    num_learnt: int = setting(15_000, "windows: of all modes, for the methods that learn from faults", smoke=60)
+    num_learnt: int = setting(
+        15_000, "windows: of all modes, for the methods that learn from faults", smoke=60
+    )
     windows_per_configuration: int = setting(50, "windows: 300 configurations are sampled", smoke=5)
 
 
@@ -56,11 +79,21 @@ class ModesSettings:
 class NoiseModelsSettings:
     """The study of noise models: `python -m studies.noise_models`."""
 
-    num_seeds: int = setting(2, "seeds: fourteen families take hours for each seed; --seeds asks for more", smoke=1)
+    num_seeds: int = setting(
+        2, "seeds: fourteen families take hours for each seed; --seeds asks for more", smoke=1
+    )
     first_seed: int = setting(3_008, "seed: models and rule were fixed before it")
-    num_windows: int = setting(5_000, "windows: windows of true noise that the models learn", smoke=120)
-    num_steps: int = setting(600, "steps: of the mixture density network; its error on held-out noise falls no further", smoke=2)
-    num_anomalous: int = setting(30, "windows: anomalous windows of each kind and severity", smoke=3)
+    num_windows: int = setting(
+        5_000, "windows: windows of true noise that the models learn", smoke=120
+    )
+    num_steps: int = setting(
+        600,
+        "steps: of the mixture density network; its error on held-out noise falls no further",
+        smoke=2,
+    )
+    num_anomalous: int = setting(
+        30, "windows: anomalous windows of each kind and severity", smoke=3
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,10 +103,16 @@ class FewWindowsSettings:
     num_seeds: int = setting(10, "seeds: as in the experiment on robustness", smoke=1)
     first_seed: int = setting(4_000, "seed: no design was chosen on these seeds")
     num_real: tuple[int, ...] = setting(
-        (5, 10, 20, 50, 100, 300, 1_000, 10_000), "windows: disjoint windows of the real record", smoke=(5, 20)
+        (5, 10, 20, 50, 100, 300, 1_000, 10_000),
+        "windows: disjoint windows of the real record",
+        smoke=(5, 20),
     )
-    num_windows: int = setting(1_500, "windows: most windows for training, as many as the paper's enhancer", smoke=60)
-    num_judged: int = setting(1_000, "windows: disjoint test windows, and as many for the matched rate", smoke=40)
+    num_windows: int = setting(
+        1_500, "windows: most windows for training, as many as the paper's enhancer", smoke=60
+    )
+    num_judged: int = setting(
+        1_000, "windows: disjoint test windows, and as many for the matched rate", smoke=40
+    )
     num_anomalous: int = setting(60, "windows: test windows with an anomaly of each kind", smoke=6)
 
 
@@ -83,7 +122,9 @@ class FactorialSettings:
 
     num_seeds: int = setting(5, "seeds: 24 cells for each", smoke=1)
     first_seed: int = setting(2_000, "seed: designs were chosen on 100 to 199")
-    max_order: int = setting(200, "samples: largest order of the fitted autoregression; AIC selects the order", smoke=40)
+    max_order: int = setting(
+        200, "samples: largest order of the fitted autoregression; AIC selects the order", smoke=40
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,11 +133,25 @@ class SpacecraftSettings:
 
     num_seeds: int = setting(3, "seeds: networks and detectors are trained with each", smoke=1)
     first_seed: int = setting(0, "seed: the first one")
-    num_windows: int = setting(2_500, "windows: about every offset in a channel of the data set once", smoke=60)
-    epochs: int = setting(6, "epochs: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1)
-    num_iterations: int = setting(1_000, "iterations: around 1,000 in the paper, section 2.3", smoke=4)
-    num_arm_windows: int = setting(2_000, "windows: training windows of each arm; as many held-out windows set its threshold", smoke=200)
-    num_folds: int = setting(5, "blocks of time: real windows set thresholds in the block that a detector was not fitted to", smoke=3)
+    num_windows: int = setting(
+        2_500, "windows: about every offset in a channel of the data set once", smoke=60
+    )
+    epochs: int = setting(
+        6, "epochs: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1
+    )
+    num_iterations: int = setting(
+        1_000, "iterations: around 1,000 in the paper, section 2.3", smoke=4
+    )
+    num_arm_windows: int = setting(
+        2_000,
+        "windows: training windows of each arm; as many held-out windows set its threshold",
+        smoke=200,
+    )
+    num_folds: int = setting(
+        5,
+        "blocks of time: real windows set thresholds in the block that a detector was not fitted to",
+        smoke=3,
+    )
     false_alarm_rate: float = setting(0.01, "share: as in the experiment on robustness")
     block: int = setting(50, "samples: block length of the bootstrap: half a period")
 
@@ -107,11 +162,19 @@ class BatterySettings:
 
     num_seeds: int = setting(10, "seeds: as in the experiment on robustness", smoke=1)
     first_seed: int = setting(3_000, "seed: designs were chosen on seeds below")
-    fit_orbits: int = setting(60, "orbits: four days of telemetry, to which the simulator is fitted", smoke=4)
-    more_orbits: int = setting(60, "orbits: as many again, for detectors trained on more real telemetry", smoke=4)
+    fit_orbits: int = setting(
+        60, "orbits: four days of telemetry, to which the simulator is fitted", smoke=4
+    )
+    more_orbits: int = setting(
+        60, "orbits: as many again, for detectors trained on more real telemetry", smoke=4
+    )
     test_orbits: int = setting(60, "orbits: four days on which everything is judged", smoke=4)
-    coarse_orbits: int = setting(120, "orbits: coarse runs from which training data are generated", smoke=8)
-    fault_orbits: int = setting(4, "orbits: orbits under each fault at each severity, in both simulators", smoke=1)
+    coarse_orbits: int = setting(
+        120, "orbits: coarse runs from which training data are generated", smoke=8
+    )
+    fault_orbits: int = setting(
+        4, "orbits: orbits under each fault at each severity, in both simulators", smoke=1
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,12 +184,20 @@ class ReferenceOrSourceSettings:
     num_seeds: int = setting(10, "seeds: as in the other studies", smoke=1)
     first_seed: int = setting(5_000, "seed: designs were chosen on seed 900")
     known_windows: tuple[int, ...] = setting(
-        (30, 100, 300, 1_000), "windows: that share no sample, of at least three flights or orbits", smoke=(30, 40)
+        (30, 100, 300, 1_000),
+        "windows: that share no sample, of at least three flights or orbits",
+        smoke=(30, 40),
     )
     middle: int = setting(100, "windows: known windows where the other axes are tried", smoke=30)
-    test_windows: int = setting(300, "windows: nominal time on which false alarms are counted", smoke=20)
-    source_windows: int = setting(300, "windows: coarse runs from which training data are generated", smoke=20)
-    parameter_windows: int = setting(20, "windows: telemetry to which parameters of the simulator are fitted", smoke=5)
+    test_windows: int = setting(
+        300, "windows: nominal time on which false alarms are counted", smoke=20
+    )
+    source_windows: int = setting(
+        300, "windows: coarse runs from which training data are generated", smoke=20
+    )
+    parameter_windows: int = setting(
+        20, "windows: telemetry to which parameters of the simulator are fitted", smoke=5
+    )
     fault_windows: int = setting(20, "windows: under each fault at each severity", smoke=5)
 
 
@@ -135,7 +206,9 @@ class Settings:
     """The settings of the paper's pipeline, the kind of noise in its telemetry, and the settings of each study."""
 
     paper: of_paper.Settings
-    noise: str = setting("white", "kind of noise: the simplest; `noise_processes.GALLERY` has others")
+    noise: str = setting(
+        "white", "kind of noise: the simplest; `noise_processes.GALLERY` has others"
+    )
     second: SecondSettings = SecondSettings()
     robustness: RobustnessSettings = RobustnessSettings()
     modes: ModesSettings = ModesSettings()
@@ -154,7 +227,9 @@ class Settings:
 
     def of(self, noise: str, seed: int) -> "Settings":
         """The same settings with another kind of noise and another seed; training ends after the paper's iterations."""
-        return dataclasses.replace(self, noise=noise, paper=dataclasses.replace(self.paper, seed=seed, rounds=1))
+        return dataclasses.replace(
+            self, noise=noise, paper=dataclasses.replace(self.paper, seed=seed, rounds=1)
+        )
 
 
 def make_settings(budget: str = "full", **changed: Any) -> Settings:
@@ -172,12 +247,24 @@ def make_settings(budget: str = "full", **changed: Any) -> Settings:
         group, _, field = name.partition("__")
         values.setdefault(group, {})[field] = value
     # only claim C4 looks beyond the paper's number of iterations
-    made: dict[str, Any] = {"paper": of_paper.make_settings(budget, **{"rounds": 1} | values.pop("paper", {}))}
-    groups = {field.name: field.type for field in dataclasses.fields(Settings) if dataclasses.is_dataclass(field.default)}
+    made: dict[str, Any] = {
+        "paper": of_paper.make_settings(budget, **{"rounds": 1} | values.pop("paper", {}))
+    }
+    groups = {
+        field.name: field.type
+        for field in dataclasses.fields(Settings)
+        if dataclasses.is_dataclass(field.default)
+    }
     for name, kind in groups.items():
         fields = {field.name: field.metadata["smoke"] for field in dataclasses.fields(kind)}
-        smaller = {field: count for field, count in fields.items() if budget == "smoke" and count is not None}
+        smaller = {
+            field: count
+            for field, count in fields.items()
+            if budget == "smoke" and count is not None
+        }
         made[name] = kind(**smaller | values.pop(name, {}))
     if values:
-        raise InputError(f"Expected settings of one of the groups paper, {', '.join(groups)}. Received: {min(values)!r}.")
+        raise InputError(
+            f"Expected settings of one of the groups paper, {', '.join(groups)}. Received: {min(values)!r}."
+        )
     return Settings(**made, budget=budget)

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def mean_interval(values: "pd.Series", factors: Sequence[str] = ("environment", "seed"), num_resamples: int = 2_000) -> dict[str, float]:
+def mean_interval(
+    values: "pd.Series",
+    factors: Sequence[str] = ("environment", "seed"),
+    num_resamples: int = 2_000,
+) -> dict[str, float]:
     """The mean of a series, and its 95 % percentile interval by a bootstrap over crossed factors.
 
     Factors are crossed if, for example, all environments were run with the same seeds. Each resample draws labels of every factor
@@ -49,8 +53,17 @@ def mean_interval(values: "pd.Series", factors: Sequence[str] = ("environment", 
     drawn = []
     for axis, size in enumerate(sizes, 1):
         labels = rng.integers(0, size, (num_resamples, size))
-        drawn.append(labels.reshape([size if each == axis else num_resamples if not each else 1 for each in range(len(shape))]))
-    found = cells[(*drawn, rng.integers(0, counts[0], shape))].reshape(num_resamples, -1).mean(axis=1)
+        drawn.append(
+            labels.reshape(
+                [
+                    size if each == axis else num_resamples if not each else 1
+                    for each in range(len(shape))
+                ]
+            )
+        )
+    found = (
+        cells[(*drawn, rng.integers(0, counts[0], shape))].reshape(num_resamples, -1).mean(axis=1)
+    )
     low, high = np.quantile(found, [0.025, 0.975]).tolist()
     return {"mean": float(numbers.mean()), "low": low, "high": high}
 

@@ -44,7 +44,11 @@ class KeptTables:
                 if column in self.labels:
                     compact[column] = compact[column].astype("category")
                 elif compact[column].dtype == np.float64:
-                    compact[column] = compact[column].round(self.digits_of.get(name, self.digits)).astype(np.float32)
+                    compact[column] = (
+                        compact[column]
+                        .round(self.digits_of.get(name, self.digits))
+                        .astype(np.float32)
+                    )
             with replace_file(folder / f"{name}.parquet") as temporary:
                 compact.to_parquet(temporary, compression="zstd", index=False)
 
@@ -58,8 +62,13 @@ class KeptTables:
 
         missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
         if missing:
-            raise InputError(f"Expected the tables of the {self.kind} in {folder}. Received: no {missing[0]}.parquet. Run {self.command}.")
-        there = [*self.names, *(name for name in self.former if (folder / f"{name}.parquet").is_file())]
+            raise InputError(
+                f"Expected the tables of the {self.kind} in {folder}. Received: no {missing[0]}.parquet. Run {self.command}."
+            )
+        there = [
+            *self.names,
+            *(name for name in self.former if (folder / f"{name}.parquet").is_file()),
+        ]
         tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in there}
         for table in tables.values():
             for column in set(self.labels) & set(table.columns):

@@ -63,8 +63,15 @@ def fit_windows(
     """
     trained = BlockwiseTraining(model) if is_wide_dense_stack(model) else model
     steps = -(-len(inputs) // batch_size)
-    at_once = 1 if callbacks else steps  # steps between which nobody looks are one call of the graph
-    trained.compile(fused_adam(learning_rate), loss="mean_squared_error", jit_compile=False, steps_per_execution=at_once)
+    at_once = (
+        1 if callbacks else steps
+    )  # steps between which nobody looks are one call of the graph
+    trained.compile(
+        fused_adam(learning_rate),
+        loss="mean_squared_error",
+        jit_compile=False,
+        steps_per_execution=at_once,
+    )
     rng = np.random.default_rng(seed)
     orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
     history = trained.fit(
@@ -80,10 +87,18 @@ def fit_windows(
     return np.array(history.history["loss"])
 
 
-def _batches(inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_size: int) -> tf.data.Dataset:
+def _batches(
+    inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_size: int
+) -> tf.data.Dataset:
     """Pairs of batches for all epochs, whose orders have the shape `(epochs, windows)`."""
     inputs, targets = tf.constant(inputs), tf.constant(targets)
-    rows = tf.data.Dataset.from_tensor_slices(orders).flat_map(lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size))
+    rows = tf.data.Dataset.from_tensor_slices(orders).flat_map(
+        lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size)
+    )
     options = tf.data.Options()
     options.autotune.enabled = False  # its thread sleeps for up to a minute, and deleting the data set waits for the thread
-    return rows.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows))).prefetch(2).with_options(options)
+    return (
+        rows.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows)))
+        .prefetch(2)
+        .with_options(options)
+    )

@@ -21,7 +21,9 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
     return run_study("factorial", tables_of, environments(options, NOISES), options, settings, out)
 
 
-description = "Combines windows, extraction, enhancer and generator of two pipelines and counts false alarms."
+description = (
+    "Combines windows, extraction, enhancer and generator of two pipelines and counts false alarms."
+)
 command = Command("factorial", description, environment_option(NOISES), run)
 
 if __name__ == "__main__":

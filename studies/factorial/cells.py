@@ -29,7 +29,13 @@ GENERATORS = (WHOLE_WINDOWS, AUTOREGRESSION)
 """Levels of the generator with which the paper's GAN is compared, the main comparison first."""
 REFERENCES = ("coarse", "real")
 """Training data outside the factorial: the two ends of the gap that the cells close."""
-DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest", "one-class SVM")
+DETECTORS = (
+    "limit check",
+    "PCA residual",
+    "nearest neighbours",
+    "isolation forest",
+    "one-class SVM",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +62,11 @@ class Cell:
     @property
     def source(self) -> tuple[str, str, str]:
         """What the noise of the cell is learnt from. Noise of the moving average does not depend on the enhancer."""
-        return self.windows, self.extraction, "" if self.extraction == MOVING_AVERAGE else self.enhancer
+        return (
+            self.windows,
+            self.extraction,
+            "" if self.extraction == MOVING_AVERAGE else self.enhancer,
+        )
 
 
 CELLS = {cell.name: cell for cell in itertools.starmap(Cell, itertools.product(*LEVELS.values()))}
@@ -68,4 +78,7 @@ WITHOUT_NETWORK = Cell(MANY, RESIDUAL, RIDGE, WHOLE_WINDOWS)
 def cells_by_source() -> dict[tuple[str, str, str], list[Cell]]:
     """The cells whose noise is learnt from the same windows, with those of one generator next to each other."""
     ordered = sorted(CELLS.values(), key=lambda cell: (cell.source, cell.generator))
-    return {source: list(cells) for source, cells in itertools.groupby(ordered, key=lambda cell: cell.source)}
+    return {
+        source: list(cells)
+        for source, cells in itertools.groupby(ordered, key=lambda cell: cell.source)
+    }

@@ -20,7 +20,10 @@ _FACTORS = {
     "enhancer": "enhancer: network\nto ridge regression",
     "generator": "generator: paper's\nGAN to another one",
 }
-_PANELS = {"gap_closed": "change of the gap closed (points)", "recall_at_real_rate": "change of recall (points)"}
+_PANELS = {
+    "gap_closed": "change of the gap closed (points)",
+    "recall_at_real_rate": "change of recall (points)",
+}
 _APART = 0.24  # distance of two generators, where that of two factors is 1
 
 
@@ -42,8 +45,12 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
         for line, (generator, (colour, marker)) in enumerate(_SHOWN.items()):
             at = -np.arange(len(LEVELS)) - _APART * (line - (len(_SHOWN) - 1) / 2)
-            shares = [found["shares"][generator][outcome]["factors"][factor]["share"] for factor in LEVELS]
-            mean, low, high = (100 * np.array([share[key] for share in shares]) for key in ("mean", "low", "high"))
+            shares = [
+                found["shares"][generator][outcome]["factors"][factor]["share"] for factor in LEVELS
+            ]
+            mean, low, high = (
+                100 * np.array([share[key] for share in shares]) for key in ("mean", "low", "high")
+            )
             axes.hlines(at, low, high, color=colour, linewidth=2, alpha=0.6)
             axes.plot(mean, at, marker, color=colour, markersize=5, label=generator)
         axes.axvline(0, color=QUIET, linewidth=0.6, zorder=0)
@@ -59,7 +66,14 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         "title_fontsize": 7.5,
         "frameon": False,
     }
-    figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(left - 0.01, 1 - down / height), ncols=len(labels), **titled)
+    figure.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(left - 0.01, 1 - down / height),
+        ncols=len(labels),
+        **titled,
+    )
     return figure
 
 

@@ -60,8 +60,14 @@ class Pipelines:
 
         _, chosen = self.example.telemetry, self.settings
         depends = (chosen.paper.of("windows", "enhancer", "noise", "noise GAN"), chosen.second)
-        depends += (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.factorial.max_order)
-        parts = {"references": list(REFERENCES)} | {" ".join(filter(None, source)): cells for source, cells in cells_by_source().items()}
+        depends += (
+            chosen.robustness.num_windows,
+            chosen.robustness.num_anomalous,
+            chosen.factorial.max_order,
+        )
+        parts = {"references": list(REFERENCES)} | {
+            " ".join(filter(None, source)): cells for source, cells in cells_by_source().items()
+        }
         found = []
         for name, cells in parts.items():
             make = functools.partial(self._make, cells)
@@ -73,7 +79,11 @@ class Pipelines:
         import pandas as pd
 
         about = {"environment": self.settings.noise, "seed": self.seed}
-        rows = [{**about, "cell": getattr(cell, "name", cell), **row} for cell in cells for row in self.judged(cell)]
+        rows = [
+            {**about, "cell": getattr(cell, "name", cell), **row}
+            for cell in cells
+            for row in self.judged(cell)
+        ]
         pd.DataFrame(rows).to_parquet(folder / "cells.parquet")
 
     @functools.cached_property
@@ -91,8 +101,16 @@ class Pipelines:
         makers = {name: detectors.DETECTORS[name] for name in DETECTORS}
         training, held_out = (self.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
         tables = evaluation.evaluate_arm(training, held_out, self._trial, makers, self.seed)
-        alarms, recall = (pd.DataFrame(tables[name]).groupby("detector", sort=False) for name in ("alarms", "recall"))
-        rows = alarms[["alarms", "windows"]].sum().join(recall[["recall", "recall_at_real_rate"]].mean()).reset_index()
+        alarms, recall = (
+            pd.DataFrame(tables[name]).groupby("detector", sort=False)
+            for name in ("alarms", "recall")
+        )
+        rows = (
+            alarms[["alarms", "windows"]]
+            .sum()
+            .join(recall[["recall", "recall_at_real_rate"]].mean())
+            .reset_index()
+        )
         return rows.to_dict("records")
 
     def arm(self, cell: str | Cell, purpose: str) -> np.ndarray:
@@ -110,15 +128,23 @@ class Pipelines:
         if cell == "coarse":
             return coarse
         rng = np.random.default_rng(int(self.example.draw(purpose).integers(2**31)))
-        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(number, rng).reshape(coarse.shape)
+        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(
+            number, rng
+        ).reshape(coarse.shape)
 
     def number(self, windows: str) -> int:
         """Number of windows that a level of the factor `windows` stands for."""
-        return {FEW: self.settings.paper.num_windows, MANY: self.settings.second.num_windows}[windows]
+        return {FEW: self.settings.paper.num_windows, MANY: self.settings.second.num_windows}[
+            windows
+        ]
 
     def training_starts(self, windows: str) -> np.ndarray:
         """Start of each training window of the enhancers: those of the paper's network, and those of the residual pipeline."""
-        rng = self.example.draw("training windows") if windows == FEW else np.random.default_rng(self.seed)
+        rng = (
+            self.example.draw("training windows")
+            if windows == FEW
+            else np.random.default_rng(self.seed)
+        )
         return random_window_starts([self.example.train], self.window, self.number(windows), rng)
 
     def pairs(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -141,11 +167,17 @@ class Pipelines:
 
         _ = self.example.telemetry
         depends = (self.settings.paper.of("windows"), self.settings.second)
-        folder = self.stages.run("second network", self._train_second, depends, ("telemetry",), version=3)
+        folder = self.stages.run(
+            "second network", self._train_second, depends, ("telemetry",), version=3
+        )
         with np.load(folder / "enhancer.npz") as arrays:
             number = sum(name.startswith("kernel_") for name in arrays)
-            layers = tuple((arrays[f"kernel_{layer}"], arrays[f"bias_{layer}"]) for layer in range(number))
-            enhancer = Enhancer(NETWORK, self.window, 1, 1, arrays["centre"], arrays["bias"], layers=layers)
+            layers = tuple(
+                (arrays[f"kernel_{layer}"], arrays[f"bias_{layer}"]) for layer in range(number)
+            )
+            enhancer = Enhancer(
+                NETWORK, self.window, 1, 1, arrays["centre"], arrays["bias"], layers=layers
+            )
         return lambda coarse: enhancer.predict(coarse[:, :, None])[:, :, 0]
 
     def _train_second(self, folder: Path) -> None:
@@ -165,7 +197,9 @@ class Pipelines:
         number = self.number(windows)
         if extraction == MOVING_AVERAGE:
             return self.example.noise_windows("train", number, "noise windows")
-        starts = random_window_starts([self.example.train], self.window, number, np.random.default_rng([self.seed, 1]))
+        starts = random_window_starts(
+            [self.example.train], self.window, number, np.random.default_rng([self.seed, 1])
+        )
         coarse, target = self.pairs(starts)
         return target - self.enhancer(enhancer, windows)(coarse)
 
@@ -182,7 +216,9 @@ class Pipelines:
         return self._model[1]
 
     def _autoregression(self, noise: np.ndarray) -> GaussianNoise:
-        return GaussianNoise.fit_autoregressions(noise[:, :, None], min(self.settings.factorial.max_order, self.window - 1))
+        return GaussianNoise.fit_autoregressions(
+            noise[:, :, None], min(self.settings.factorial.max_order, self.window - 1)
+        )
 
     def _paper_gan(self, noise: np.ndarray) -> "PaperGAN":
         from studies.common.paper_gan import PaperGAN

@@ -46,11 +46,19 @@ CONTRASTS = {
     "no network, real": (WITHOUT_NETWORK.name, "real"),
     "no network, paper": (WITHOUT_NETWORK.name, PAPER_CELL.name),
     "network, ridge": (Cell(MANY, RESIDUAL, NETWORK, WHOLE_WINDOWS).name, WITHOUT_NETWORK.name),
-    "autoregression, whole windows": (Cell(MANY, RESIDUAL, RIDGE, AUTOREGRESSION).name, WITHOUT_NETWORK.name),
+    "autoregression, whole windows": (
+        Cell(MANY, RESIDUAL, RIDGE, AUTOREGRESSION).name,
+        WITHOUT_NETWORK.name,
+    ),
     "few, many": (Cell(FEW, RESIDUAL, RIDGE, WHOLE_WINDOWS).name, WITHOUT_NETWORK.name),
 }
 """Differences in false alarms and recall that the conclusions use: the first cell minus the second."""
-KEPT = KeptTables(("cells",), labels=("environment", "cell", "detector"), digits=4, command="python -m studies.factorial")
+KEPT = KeptTables(
+    ("cells",),
+    labels=("environment", "cell", "detector"),
+    digits=4,
+    command="python -m studies.factorial",
+)
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
@@ -74,7 +82,10 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
             | {outcome: float(values[outcome][name].mean()) for outcome in OUTCOMES}
             for name in (*REFERENCES, *CELLS)
         },
-        "shares": {generator: {outcome: shares(values[outcome], generator) for outcome in OUTCOMES} for generator in GENERATORS},
+        "shares": {
+            generator: {outcome: shares(values[outcome], generator) for outcome in OUTCOMES}
+            for generator in GENERATORS
+        },
         "contrasts": {name: _contrast(values, *pair) for name, pair in CONTRASTS.items()},
     }
 
@@ -83,7 +94,9 @@ def averaged(table: "pd.DataFrame") -> "dict[str, pd.DataFrame]":
     """Means over detectors: the false-alarm rate and both outcomes; replicates in rows and cells in columns."""
     groups = table.assign(rate=table["alarms"] / table["windows"]).groupby([*REPLICATE, "cell"])
     rate, recall = (groups[name].mean().unstack("cell") for name in ("rate", "recall_at_real_rate"))
-    gap = rate.rsub(rate["coarse"], axis=0).div(rate["coarse"] - rate["real"], axis=0)  # NaN or infinite if there is no gap
+    gap = rate.rsub(rate["coarse"], axis=0).div(
+        rate["coarse"] - rate["real"], axis=0
+    )  # NaN or infinite if there is no gap
     return {"false_alarms": rate, "gap_closed": gap, "recall_at_real_rate": recall}
 
 
@@ -96,7 +109,12 @@ def corner(switched: Iterable[str], generator: str) -> str:
     """
     switched = set(switched)
     second = {factor: levels[1] for factor, levels in LEVELS.items()} | {"generator": generator}
-    return Cell(**{factor: second[factor] if factor in switched else levels[0] for factor, levels in LEVELS.items()}).name
+    return Cell(
+        **{
+            factor: second[factor] if factor in switched else levels[0]
+            for factor, levels in LEVELS.items()
+        }
+    ).name
 
 
 def shares(values: "pd.DataFrame", generator: str) -> dict[str, Any]:
@@ -106,7 +124,9 @@ def shares(values: "pd.DataFrame", generator: str) -> dict[str, Any]:
         values: The outcome; replicates in rows and cells in columns.
         generator: The generator that replaces the paper's GAN.
     """
-    subsets = [each for size in range(len(LEVELS) + 1) for each in itertools.combinations(LEVELS, size)]
+    subsets = [
+        each for size in range(len(LEVELS) + 1) for each in itertools.combinations(LEVELS, size)
+    ]
     worth = {frozenset(each): values[corner(each, generator)] for each in subsets}
     every = frozenset(LEVELS)
     return {
@@ -141,13 +161,19 @@ def contribution(worth: Mapping[frozenset[str], Any], factor: str) -> Any:
 
 def _contrast(values: "Mapping[str, pd.DataFrame]", first: str, second: str) -> dict[str, Any]:
     """Differences between two cells: crossed intervals over all environments, and Student's intervals over seeds within each."""
-    differences = {name: values[name][first] - values[name][second] for name in ("false_alarms", "recall_at_real_rate")}
+    differences = {
+        name: values[name][first] - values[name][second]
+        for name in ("false_alarms", "recall_at_real_rate")
+    }
     environments = differences["false_alarms"].index.unique("environment")
     return {
         "first": first,
         "second": second,
         **{name: mean_interval(each) for name, each in differences.items()},
         "by_environment": {
-            environment: {name: t_interval(each.xs(environment)) for name, each in differences.items()} for environment in environments
+            environment: {
+                name: t_interval(each.xs(environment)) for name, each in differences.items()
+            }
+            for environment in environments
         },
     }

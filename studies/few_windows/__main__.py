@@ -18,9 +18,16 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
 
     def tables_of(environment: str, seed: int, stages: Any) -> dict[str, pd.DataFrame]:
         world = World(settings.of(environment, seed))
-        return {"rows": pd.concat([world.rows(number, stages) for number in settings.few_windows.num_real], ignore_index=True)}
+        return {
+            "rows": pd.concat(
+                [world.rows(number, stages) for number in settings.few_windows.num_real],
+                ignore_index=True,
+            )
+        }
 
-    return run_study("few_windows", tables_of, environments(options, NOISES), options, settings, out)
+    return run_study(
+        "few_windows", tables_of, environments(options, NOISES), options, settings, out
+    )
 
 
 description = "Varies the number of real windows from which detectors and simulators learn."

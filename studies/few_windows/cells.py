@@ -19,12 +19,25 @@ from studies.common.evaluation import cross_fitted_scores
 from studies.common.example import coarse_simulator, draw_noise
 from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import Settings
-from studies.few_windows.record import CORAL, NOISE_MODELS, NUM_BLOCKS, REAL, SIMULATOR, Record, coral_alignment
+from studies.few_windows.record import (
+    CORAL,
+    NOISE_MODELS,
+    NUM_BLOCKS,
+    REAL,
+    SIMULATOR,
+    Record,
+    coral_alignment,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
-QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")  # detectors whose training takes about a second
+QUICK = (
+    "limit check",
+    "PCA residual",
+    "nearest neighbours",
+    "isolation forest",
+)  # detectors whose training takes about a second
 SEVERITY = 4.0  # of the anomalies, in standard deviations of the noise
 _CORAL_SOURCE = 10  # times as many simulated windows for the covariance of CORAL as for training: they cost nothing
 _FRESH, _THRESHOLD, _CORAL, _ANOMALIES = 81, 82, 83, 84  # numbers of random draws
@@ -43,7 +56,9 @@ class World:
         self.length = max(counts.num_real) * self.window
         number = self.length + (2 * counts.num_judged + 1) * self.window
         clean = true_signal(chosen)(chosen.interval * np.arange(number))
-        rng = np.random.default_rng([settings.seed, zlib.crc32(b"learning curve")])  # the draw of the published table
+        rng = np.random.default_rng(
+            [settings.seed, zlib.crc32(b"learning curve")]
+        )  # the draw of the published table
         noise = draw_noise(settings.noise, clean, chosen.noise_sd, rng)
         self.noise_sd = float(np.std(noise))
         self.values = (clean + noise).astype(np.float32)
@@ -53,8 +68,16 @@ class World:
         """The last `num_real` windows before a gap of one window, after which the judged windows begin."""
         interval_s = self.settings.paper.interval
         first = self.length - num_real * self.window
-        telemetry = Telemetry(self.values[first : self.length], interval_s, name="record", offset_s=first * interval_s)
-        return Record(telemetry, self.coarse, self.window, self.settings.few_windows.num_windows, self.settings.seed)
+        telemetry = Telemetry(
+            self.values[first : self.length], interval_s, name="record", offset_s=first * interval_s
+        )
+        return Record(
+            telemetry,
+            self.coarse,
+            self.window,
+            self.settings.few_windows.num_windows,
+            self.settings.seed,
+        )
 
     @functools.cached_property
     def judged(self) -> dict[str, np.ndarray]:
@@ -69,7 +92,11 @@ class World:
             for offset, duration in enumerate(DURATIONS):
                 rng = np.random.default_rng([self.settings.seed, _ANOMALIES, number, offset])
                 pieces = chosen[offset :: len(DURATIONS)]
-                parts.append(inject(pieces, kind, SEVERITY, min(duration, self.window), self.noise_sd, rng)[0])
+                parts.append(
+                    inject(pieces, kind, SEVERITY, min(duration, self.window), self.noise_sd, rng)[
+                        0
+                    ]
+                )
         return {"nominal": nominal, "reference": reference, "anomalous": np.concatenate(parts)}
 
     def rows(self, num_real: int, stages: Stages) -> "pd.DataFrame":
@@ -77,26 +104,51 @@ class World:
         import pandas as pd
 
         chosen = self.settings
-        same = dataclasses.replace(chosen.few_windows, num_seeds=0, first_seed=0)  # which seeds are computed does not affect a cell
-        depends = (num_real, chosen.paper.of("telemetry"), self.window, chosen.noise, same, chosen.paper.false_alarm_rate)
+        same = dataclasses.replace(
+            chosen.few_windows, num_seeds=0, first_seed=0
+        )  # which seeds are computed does not affect a cell
+        depends = (
+            num_real,
+            chosen.paper.of("telemetry"),
+            self.window,
+            chosen.noise,
+            same,
+            chosen.paper.false_alarm_rate,
+        )
 
         def make(folder: Path) -> None:
             about = {"num_real": num_real, "seed": chosen.seed, "environment": chosen.noise}
-            pd.DataFrame(self._rows(self.record(num_real))).assign(**about).to_parquet(folder / "rows.parquet")
+            pd.DataFrame(self._rows(self.record(num_real))).assign(**about).to_parquet(
+                folder / "rows.parquet"
+            )
 
-        return pd.read_parquet(stages.run(f"few windows {num_real}", make, depends) / "rows.parquet")
+        return pd.read_parquet(
+            stages.run(f"few windows {num_real}", make, depends) / "rows.parquet"
+        )
 
     def _rows(self, record: Record) -> list[dict]:
-        number, seed, real = self.settings.few_windows.num_windows, self.settings.seed, record.windows
+        number, seed, real = (
+            self.settings.few_windows.num_windows,
+            self.settings.seed,
+            record.windows,
+        )
         rows = []
         for name in QUICK:
             make = functools.partial(DETECTORS[name], seed)
             past = cross_fitted_scores(make, real, record.starts, NUM_BLOCKS)
             rows.append({"arm": REAL, "detector": name} | self._judge(make().fit(real).score, past))
-        generated = {SIMULATOR + model: [record.generate(model, number, draw) for draw in (_FRESH, _THRESHOLD)] for model in NOISE_MODELS}
+        generated = {
+            SIMULATOR + model: [
+                record.generate(model, number, draw) for draw in (_FRESH, _THRESHOLD)
+            ]
+            for model in NOISE_MODELS
+        }
         # The map whitens the windows that it is fitted to better than others, so training and threshold use other windows than these.
         numbers = (_CORAL_SOURCE * number, number, number)
-        source, *others = (record.generate("gaussian", each, _CORAL + 100 * place) for place, each in enumerate(numbers))
+        source, *others = (
+            record.generate("gaussian", each, _CORAL + 100 * place)
+            for place, each in enumerate(numbers)
+        )
         align = coral_alignment(source, real)
         generated[CORAL] = [align(windows) for windows in others]
         for arm, (training, held_out) in generated.items():
@@ -105,10 +157,14 @@ class World:
                 rows.append({"arm": arm, "detector": name} | self._judge(score, score(held_out)))
         return rows
 
-    def _judge(self, score: Callable[[np.ndarray], np.ndarray], threshold_scores: np.ndarray) -> dict:
+    def _judge(
+        self, score: Callable[[np.ndarray], np.ndarray], threshold_scores: np.ndarray
+    ) -> dict:
         rate = self.settings.paper.false_alarm_rate
         threshold, _ = metrics.finite_threshold(threshold_scores, rate)
-        nominal, reference, anomalous = (score(self.judged[kind]) for kind in ("nominal", "reference", "anomalous"))
+        nominal, reference, anomalous = (
+            score(self.judged[kind]) for kind in ("nominal", "reference", "anomalous")
+        )
         return {
             "alarms": int(np.sum(nominal > threshold)),
             "windows": len(nominal),

@@ -8,7 +8,16 @@ import matplotlib.ticker
 from matplotlib.axes import Axes
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import AVERAGE, DOUBLE, FOOT, QUIET, REAL, RESIDUALS, new_sheet, panels
+from enhsim_tf.common.plot_style import (
+    AVERAGE,
+    DOUBLE,
+    FOOT,
+    QUIET,
+    REAL,
+    RESIDUALS,
+    new_sheet,
+    panels,
+)
 from studies.few_windows import record
 
 _CURVES = {  # label, marker, line style and colour of each curve that is drawn
@@ -30,21 +39,46 @@ def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         "nominal windows that are flagged; the line is the target of 1 %; the scale is linear below it. Below: anomalies of 4 standard deviations "
         "found at 1 % false alarms.",
     )
-    grid = panels(figure, down + 0.45, 2, len(environments), gap=(0.3, 0.2), sharex=True, sharey="row")
+    grid = panels(
+        figure, down + 0.45, 2, len(environments), gap=(0.3, 0.2), sharex=True, sharey="row"
+    )
     for (name, about), (upper, lower) in zip(environments.items(), grid.T, strict=True):
         for arm, (label, marker, line, colour) in _CURVES.items():
             curve = about["arms"][arm]
             at = [number for number in numbers if str(number) in curve["rate"]]
-            style = {"marker": marker, "linestyle": line, "color": colour, "markersize": 3.5, "linewidth": 1.0, "markerfacecolor": "none"}
-            upper.plot(at, [100 * curve["rate"][str(number)] for number in at], label=label, **style)
-            lower.plot(at, [100 * curve["recall_at_real_rate"][str(number)] for number in at], **style)
+            style = {
+                "marker": marker,
+                "linestyle": line,
+                "color": colour,
+                "markersize": 3.5,
+                "linewidth": 1.0,
+                "markerfacecolor": "none",
+            }
+            upper.plot(
+                at, [100 * curve["rate"][str(number)] for number in at], label=label, **style
+            )
+            lower.plot(
+                at, [100 * curve["recall_at_real_rate"][str(number)] for number in at], **style
+            )
         _finish(upper, lower, numbers, name)
     grid[0, 0].set_ylabel("false alarms (%)")
     grid[1, 0].set_ylabel("recall (%)")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     height = figure.get_size_inches()[1]
-    figure.legend(handles, labels, frameon=False, ncols=4, loc="upper left", bbox_to_anchor=(0.07, 1 - (down - 0.02) / height))
-    figure.text(0.53, (FOOT + 0.02) / height, "number of real windows k (disjoint; logarithmic)", ha="center")
+    figure.legend(
+        handles,
+        labels,
+        frameon=False,
+        ncols=4,
+        loc="upper left",
+        bbox_to_anchor=(0.07, 1 - (down - 0.02) / height),
+    )
+    figure.text(
+        0.53,
+        (FOOT + 0.02) / height,
+        "number of real windows k (disjoint; logarithmic)",
+        ha="center",
+    )
     return figure
 
 
@@ -53,7 +87,9 @@ def _finish(upper: Axes, lower: Axes, numbers: list[int], name: str) -> None:
     upper.set_title(name, loc="left")
     upper.set_yscale("symlog", linthresh=1)
     upper.set_ylim(0, 110)
-    upper.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50, 100], ["0", "0.5", "1", "2", "5", "10", "20", "50", "100"])
+    upper.set_yticks(
+        [0, 0.5, 1, 2, 5, 10, 20, 50, 100], ["0", "0.5", "1", "2", "5", "10", "20", "50", "100"]
+    )
     upper.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     lower.set_ylim(0, 100)
     lower.set_xscale("log")

@@ -27,7 +27,11 @@ from studies.common.gaussian_noise import fit_candidate
 REAL, CORAL = "real", "CORAL"
 SIMULATOR = "simulator + "
 """Beginning of the names of training data with noise of a model; the name of the model follows."""
-NOISE_MODELS = ("gaussian", "autoregression", "residual windows")  # in no environment does the noise follow the signal
+NOISE_MODELS = (
+    "gaussian",
+    "autoregression",
+    "residual windows",
+)  # in no environment does the noise follow the signal
 NUM_BLOCKS = 5  # of time, for cross-fitting
 _START_RANGE = 1_000_000  # generated windows begin at a random sample below this one
 
@@ -43,13 +47,24 @@ class Record:
         seed: Seed of everything that is drawn or trained.
     """
 
-    def __init__(self, telemetry: Telemetry, coarse: SquareWaveSimulator, window: int, most: int, seed: int):
-        self.telemetry, self.coarse, self.window, self.most, self.seed = telemetry, coarse, window, most, seed
+    def __init__(
+        self, telemetry: Telemetry, coarse: SquareWaveSimulator, window: int, most: int, seed: int
+    ):
+        self.telemetry, self.coarse, self.window, self.most, self.seed = (
+            telemetry,
+            coarse,
+            window,
+            most,
+            seed,
+        )
         self.starts = evenly_spaced_starts([telemetry], window, most)
         self.windows = cut_windows(telemetry.values, self.starts, window)
 
     def _coarse(self, starts: np.ndarray) -> np.ndarray:
-        return self.coarse.simulate(self.telemetry.offset_s + self.telemetry.interval_s * (starts[:, None] + np.arange(self.window)))
+        return self.coarse.simulate(
+            self.telemetry.offset_s
+            + self.telemetry.interval_s * (starts[:, None] + np.arange(self.window))
+        )
 
     @functools.cached_property
     def enhance(self) -> Callable[[np.ndarray], np.ndarray]:
@@ -80,7 +95,9 @@ def coral_alignment(source: np.ndarray, target: np.ndarray) -> Callable[[np.ndar
     colours it as the target; it returns float32.
     """
     transfer = _power(_covariance(source), -0.5) @ _power(_covariance(target), 0.5)
-    return lambda windows: ((windows - source.mean(axis=0)) @ transfer + target.mean(axis=0)).astype(np.float32)
+    return lambda windows: (
+        (windows - source.mean(axis=0)) @ transfer + target.mean(axis=0)
+    ).astype(np.float32)
 
 
 def _covariance(windows: np.ndarray) -> np.ndarray:

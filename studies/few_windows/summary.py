@@ -37,7 +37,9 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         `pays`, and those at which other methods do, compared with the real windows of the same seeds; and the smallest number from which
         the real windows suffice.
     """
-    rows = tables["rows"].astype({"recall": float, "recall_at_real_rate": float})  # tables hold float32
+    rows = tables["rows"].astype(
+        {"recall": float, "recall_at_real_rate": float}
+    )  # tables hold float32
     rows["rate"] = rows["alarms"] / rows["windows"]
     numbers = sorted({int(number) for number in rows["num_real"]})
     environments = {}
@@ -45,21 +47,36 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         own = rows[rows["environment"] == environment]
         curves = {arm: _curve(own[own["arm"] == arm], numbers) for arm in dict.fromkeys(own["arm"])}
         excess = curves[REAL]["excess"]
-        suffices = [number for number in numbers if all(excess[str(n)] <= SUFFICES for n in numbers if n >= number)]
+        suffices = [
+            number
+            for number in numbers
+            if all(excess[str(n)] <= SUFFICES for n in numbers if n >= number)
+        ]
         environments[environment] = {
             "arms": curves,
             "pays": {arm: _pays(own, arm, numbers) for arm in curves if arm.startswith(SIMULATOR)},
-            "others_pay": {arm: _pays(own, arm, numbers) for arm in curves if arm != REAL and not arm.startswith(SIMULATOR)},
+            "others_pay": {
+                arm: _pays(own, arm, numbers)
+                for arm in curves
+                if arm != REAL and not arm.startswith(SIMULATOR)
+            },
             "real_suffices_from": suffices[0] if suffices else None,
         }
-    return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
+    return {
+        "environments": environments,
+        "numbers": numbers,
+        "seeds": sorted({int(seed) for seed in rows["seed"]}),
+    }
 
 
 def _curve(rows: "pd.DataFrame", numbers: Sequence[int]) -> dict[str, dict[str, float]]:
     """Means over seeds of the false-alarm rate, its excess and both recalls, by the number of real windows."""
     by_seed = rows.groupby(["num_real", "seed"])[["rate", "recall", "recall_at_real_rate"]].mean()
     means = by_seed.groupby("num_real").mean().assign(excess=lambda table: table["rate"] - RATE)
-    return {name: {str(number): float(values[number]) for number in numbers if number in values.index} for name, values in means.items()}
+    return {
+        name: {str(number): float(values[number]) for number in numbers if number in values.index}
+        for name, values in means.items()
+    }
 
 
 def _pays(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> list[int]:
@@ -71,6 +88,9 @@ def _pays(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> list[int]:
         at = str(number)
         if at in its["excess"] and real["excess"][at] > SUFFICES:
             loss = real["recall_at_real_rate"][at] - its["recall_at_real_rate"][at]
-            if max(its["excess"][at], 0) <= PAYS_SHARE * real["excess"][at] and loss <= MAX_RECALL_LOSS:
+            if (
+                max(its["excess"][at], 0) <= PAYS_SHARE * real["excess"][at]
+                and loss <= MAX_RECALL_LOSS
+            ):
                 found.append(number)
     return found

@@ -17,7 +17,9 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
     def tables_of(family: str, seed: int, stages: Any) -> dict[str, Any]:
         return Cell(settings.of(family, seed), stages).tables()
 
-    return run_study("noise_models", tables_of, environments(options, GALLERY), options, settings, out)
+    return run_study(
+        "noise_models", tables_of, environments(options, GALLERY), options, settings, out
+    )
 
 
 description = "Tries noise models on fourteen families of noise."

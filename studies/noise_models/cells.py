@@ -29,7 +29,14 @@ MODELS = (*CANDIDATES, LEARNT)
 """The noise models that are tried, the simplest first."""
 _NUM_DRAWS = 3  # of as many generated windows as there are real ones: measures of realism are means over them
 # numbers of random draws, and the names of draws below, are those of the published tables
-_STREAMS = {"none": 0, "gaussian": 1, "autoregression": 2, "residual windows": 3, "matched residual windows": 7, LEARNT: 8}
+_STREAMS = {
+    "none": 0,
+    "gaussian": 1,
+    "autoregression": 2,
+    "residual windows": 3,
+    "matched residual windows": 7,
+    LEARNT: 8,
+}
 _DRAW = 71
 
 
@@ -51,15 +58,24 @@ class Cell:
         import pandas as pd
 
         _, chosen = self.example.telemetry, self.settings
-        counts = (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.noise_models)
+        counts = (
+            chosen.robustness.num_windows,
+            chosen.robustness.num_anomalous,
+            chosen.noise_models,
+        )
         depends = (chosen.paper.of("windows"), *counts)
         parts: dict[str, list[pd.DataFrame]] = {name: [] for name in KEPT.names}
         for model in (REAL, *MODELS):
             name = "noise model " + model.replace(" ", "_")
-            folder = self.stages.run(name, functools.partial(self._make, model), (model, *depends), ("telemetry",))
+            folder = self.stages.run(
+                name, functools.partial(self._make, model), (model, *depends), ("telemetry",)
+            )
             for table, found in parts.items():
                 found.append(pd.read_parquet(folder / f"{table}.parquet"))
-        return {name: pd.concat([each for each in found if len(each)], ignore_index=True) for name, found in parts.items()}
+        return {
+            name: pd.concat([each for each in found if len(each)], ignore_index=True)
+            for name, found in parts.items()
+        }
 
     def _make(self, model: str, folder: Path) -> None:
         import pandas as pd
@@ -67,12 +83,20 @@ class Cell:
         floor, held_out = self._floor()
         if model == REAL:
             number = self.settings.robustness.num_windows
-            arms = [self.example.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
+            arms = [
+                self.example.windows(part, number, f"ladder, real, {part}")["target"]
+                for part in ("train", "calibration")
+            ]
             compared = [held_out]
         else:
             arms, compared = self._generated(model, len(held_out))
-        for name, rows in {"detectors": self._detected(arms), "realism": _measured(floor, compared)}.items():
-            table = pd.DataFrame(rows).assign(family=self.settings.noise, seed=self.settings.seed, model=model)
+        for name, rows in {
+            "detectors": self._detected(arms),
+            "realism": _measured(floor, compared),
+        }.items():
+            table = pd.DataFrame(rows).assign(
+                family=self.settings.noise, seed=self.settings.seed, model=model
+            )
             table.to_parquet(folder / f"{name}.parquet")
 
     def _generated(self, name: str, number: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -80,11 +104,19 @@ class Cell:
         model, seed = self._fit(name), self.settings.seed
         rng = np.random.default_rng([seed, _STREAMS[name], _DRAW])
         purposes = ("ladder, training", "ladder, threshold")
-        waves = [self.example.windows("train", self.settings.robustness.num_windows, purpose)["truth"] for purpose in purposes]
-        arms = [clean + model.generate(len(clean), rng, clean[:, :, None])[:, :, 0] for clean in waves]
+        waves = [
+            self.example.windows("train", self.settings.robustness.num_windows, purpose)["truth"]
+            for purpose in purposes
+        ]
+        arms = [
+            clean + model.generate(len(clean), rng, clean[:, :, None])[:, :, 0] for clean in waves
+        ]
         more = self.example.windows("calibration", number, "ladder, realism")["truth"]
         # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
-        compared = [more + model.generate(number, rng, more[:, :, None])[:, :, 0] - more for _ in range(_NUM_DRAWS)]
+        compared = [
+            more + model.generate(number, rng, more[:, :, None])[:, :, 0] - more
+            for _ in range(_NUM_DRAWS)
+        ]
         return arms, compared
 
     def _fit(self, name: str) -> "GaussianNoise | WindowBootstrap | _OneChannel":
@@ -100,7 +132,9 @@ class Cell:
         samples = [windows["target"] - windows["truth"] for windows in every]
         number = min(self.settings.robustness.num_windows, *map(len, samples))
         real, again, held_out = (noise[:number] for noise in samples)
-        return RealFloor(real, again, self.settings.robustness.num_resplits, self.settings.seed), held_out
+        return RealFloor(
+            real, again, self.settings.robustness.num_resplits, self.settings.seed
+        ), held_out
 
     def _detected(self, arms: list[np.ndarray]) -> list[dict]:
         """False alarms and recall of every detector, trained on the first windows, with the threshold of the second ones."""
@@ -108,16 +142,24 @@ class Cell:
         judged = evaluation.evaluate_arm(*arms, trial, DETECTORS, self.settings.seed)
         rows = []
         for name in DETECTORS:
-            alarms, recall = ([row for row in judged[key] if row["detector"] == name] for key in ("alarms", "recall"))
+            alarms, recall = (
+                [row for row in judged[key] if row["detector"] == name]
+                for key in ("alarms", "recall")
+            )
             counts = {key: sum(row[key] for row in alarms) for key in ("alarms", "windows")}
-            means = {key: float(np.mean([row[key] for row in recall])) for key in ("recall", "recall_at_real_rate")}
+            means = {
+                key: float(np.mean([row[key] for row in recall]))
+                for key in ("recall", "recall_at_real_rate")
+            }
             rows.append({"detector": name, **counts, **means})
         return rows
 
     @functools.cached_property
     def _learnt(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Windows of noise of the training part, from which the models learn, the signal below them, and their first samples."""
-        windows = self.example.windows("train", self.settings.noise_models.num_windows, "ladder, learnt")
+        windows = self.example.windows(
+            "train", self.settings.noise_models.num_windows, "ladder, learnt"
+        )
         target, truth = (windows[name][:, :, None] for name in ("target", "truth"))
         return target - truth, truth, windows["start"]
 
@@ -138,4 +180,9 @@ def _measured(floor: RealFloor, compared: list[np.ndarray]) -> "pd.DataFrame":
     import pandas as pd
 
     rows = [row for each in compared for row in floor.evaluate(each)]
-    return pd.DataFrame(rows, columns=Row._fields).groupby("measure", sort=False).agg(lambda each: each.mean(skipna=False)).reset_index()
+    return (
+        pd.DataFrame(rows, columns=Row._fields)
+        .groupby("measure", sort=False)
+        .agg(lambda each: each.mean(skipna=False))
+        .reset_index()
+    )

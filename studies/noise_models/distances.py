@@ -11,19 +11,26 @@ import numpy as np
 from enhsim_tf.common.measures import lagged_products
 
 _TINY = 1e-30  # keeps logarithms and quotients of constant windows finite
-_TIME_HALF_BANDWIDTH, _NUM_TAPERS = 4, 7  # samples times half the bandwidth in cycles a sample; Slepian tapers that are averaged
+_TIME_HALF_BANDWIDTH, _NUM_TAPERS = (
+    4,
+    7,
+)  # samples times half the bandwidth in cycles a sample; Slepian tapers that are averaged
 _NUM_KERNELS = 16  # of each of the dilations 1, 2, 4, ...
 _NUM_NEIGHBOURS = 5  # rank of the neighbour that defines the radius of a neighbourhood
 
 
 def lagged_square_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
     """`lagged_products` of the squared deviations from the mean, which show volatility clustering."""
-    return lagged_products((np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)) ** 2, max_lag)
+    return lagged_products(
+        (np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)) ** 2, max_lag
+    )
 
 
 def autocorrelation_distance(generated_products: np.ndarray, real_products: np.ndarray) -> float:
     """Largest absolute difference of two autocorrelations, which are computed from two sets of `lagged_products`."""
-    generated, real = (np.mean(products, axis=0) for products in (generated_products, real_products))
+    generated, real = (
+        np.mean(products, axis=0) for products in (generated_products, real_products)
+    )
     return float(np.max(np.abs(generated / (generated[0] + _TINY) - real / (real[0] + _TINY))))
 
 
@@ -95,7 +102,9 @@ def log_spectral_distance(generated_spectra: np.ndarray, real_spectra: np.ndarra
 
 
 def _log_ratio(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> np.ndarray:
-    return np.log(np.median(generated_spectra, axis=0) + _TINY) - np.log(np.median(real_spectra, axis=0) + _TINY)
+    return np.log(np.median(generated_spectra, axis=0) + _TINY) - np.log(
+        np.median(real_spectra, axis=0) + _TINY
+    )
 
 
 def convolution_features(windows: np.ndarray) -> np.ndarray:
@@ -115,13 +124,25 @@ def convolution_features(windows: np.ndarray) -> np.ndarray:
     found = []
     for dilation in 2 ** np.arange(int(np.log2((values.shape[1] - 1) / (taps - 1))) + 1):
         kernels = rng.standard_normal((taps, _NUM_KERNELS)).astype(np.float32)
-        kernels /= np.linalg.norm(kernels, axis=0)  # the responses to white noise of standard deviation 1 have standard deviation 1
+        kernels /= np.linalg.norm(
+            kernels, axis=0
+        )  # the responses to white noise of standard deviation 1 have standard deviation 1
         thresholds = rng.standard_normal(_NUM_KERNELS).astype(np.float32)
         pooled = []
         for begin in range(0, len(values), 64):  # 64 windows fit into the processor's cache
-            reach = np.lib.stride_tricks.sliding_window_view(values[begin : begin + 64], (taps - 1) * dilation + 1, axis=1)
+            reach = np.lib.stride_tricks.sliding_window_view(
+                values[begin : begin + 64], (taps - 1) * dilation + 1, axis=1
+            )
             response = np.ascontiguousarray(reach[:, :, ::dilation]) @ kernels
-            pooled.append(np.concatenate([response.max(axis=1), np.mean(response > thresholds, axis=1, dtype=np.float32)], axis=1))
+            pooled.append(
+                np.concatenate(
+                    [
+                        response.max(axis=1),
+                        np.mean(response > thresholds, axis=1, dtype=np.float32),
+                    ],
+                    axis=1,
+                )
+            )
         found.append(np.concatenate(pooled))
     return np.concatenate(found, axis=1)
 
@@ -136,7 +157,10 @@ def density(generated_features: np.ndarray, real_features: np.ndarray) -> float:
         generated_features: Features of generated windows, shape `(windows, features)`.
         real_features: Features of real windows, shape `(windows, features)`.
     """
-    return float(_inside(generated_features, real_features).sum() / (_NUM_NEIGHBOURS * len(generated_features)))
+    return float(
+        _inside(generated_features, real_features).sum()
+        / (_NUM_NEIGHBOURS * len(generated_features))
+    )
 
 
 def coverage(generated_features: np.ndarray, real_features: np.ndarray) -> float:
@@ -152,8 +176,12 @@ def _inside(generated_features: np.ndarray, real_features: np.ndarray) -> np.nda
     """Whether each generated window lies in each real neighbourhood, shape `(generated, real)`."""
     from scipy.spatial.distance import cdist
 
-    generated, real = (_standardised(features, real_features) for features in (generated_features, real_features))
-    reach = np.partition(cdist(real, real, "sqeuclidean"), _NUM_NEIGHBOURS, axis=1)[:, _NUM_NEIGHBOURS]  # index 0 is the window itself
+    generated, real = (
+        _standardised(features, real_features) for features in (generated_features, real_features)
+    )
+    reach = np.partition(cdist(real, real, "sqeuclidean"), _NUM_NEIGHBOURS, axis=1)[
+        :, _NUM_NEIGHBOURS
+    ]  # index 0 is the window itself
     return cdist(generated, real, "sqeuclidean") <= reach
 
 
@@ -165,14 +193,24 @@ def mmd_squared(generated_features: np.ndarray, real_features: np.ndarray) -> fl
     """
     from scipy.spatial.distance import pdist, squareform
 
-    generated, real = (_standardised(features, real_features) for features in (generated_features, real_features))
-    bandwidth, number, other = max(np.median(pdist(real, "sqeuclidean")), 1e-12), len(generated), len(real)
-    kernel = squareform(np.exp(pdist(np.concatenate([generated, real]), "sqeuclidean") / (-2 * bandwidth)))  # with zeros on the diagonal
+    generated, real = (
+        _standardised(features, real_features) for features in (generated_features, real_features)
+    )
+    bandwidth, number, other = (
+        max(np.median(pdist(real, "sqeuclidean")), 1e-12),
+        len(generated),
+        len(real),
+    )
+    kernel = squareform(
+        np.exp(pdist(np.concatenate([generated, real]), "sqeuclidean") / (-2 * bandwidth))
+    )  # with zeros on the diagonal
     is_generated = np.repeat([1.0, 0.0], [number, other])[:, None]
     to_generated = kernel @ is_generated
     both, cross = np.sum(is_generated * to_generated), np.sum((1 - is_generated) * to_generated)
     rest = kernel.sum() - both - 2 * cross
-    return float(both / (number * (number - 1)) + rest / (other * (other - 1)) - 2 * cross / (number * other))
+    return float(
+        both / (number * (number - 1)) + rest / (other * (other - 1)) - 2 * cross / (number * other)
+    )
 
 
 def _standardised(features: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -29,7 +29,9 @@ _BLOCK = 10  # consecutive windows that stay together when the windows are split
 def linear_classifier(generated_features: np.ndarray, real_features: np.ndarray) -> float:
     """AUC as that of `two_sample.boosted_trees`, of a ridge classifier on standardised features, intended for many features."""
     classifier = make_pipeline(StandardScaler(), RidgeClassifier(alpha=100.0))
-    return two_sample.held_out_auc(classifier, "decision_function", generated_features, real_features)
+    return two_sample.held_out_auc(
+        classifier, "decision_function", generated_features, real_features
+    )
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,11 @@ class Measure:
 
     def departure(self, value: float) -> float:
         """Returns the distance of a value from the perfect value, which is at least 0."""
-        return float(abs(np.log(max(value, 1e-12) / self.perfect)) if self.is_ratio else abs(value - self.perfect))
+        return float(
+            abs(np.log(max(value, 1e-12) / self.perfect))
+            if self.is_ratio
+            else abs(value - self.perfect)
+        )
 
 
 def _values(windows: np.ndarray) -> np.ndarray:
@@ -82,13 +88,29 @@ MEASURES = (
     Measure("kurtosis difference", _values, distances.kurtosis_difference),
     Measure("tail ratio", _values, distances.tail_ratio, perfect=1.0, is_ratio=True),
     Measure("autocorrelation distance", _products, distances.autocorrelation_distance),
-    Measure("autocorrelation distance of squares", _square_products, distances.autocorrelation_distance),
-    Measure("classifier AUC, boosted trees", window_features, two_sample.boosted_trees, perfect=0.5, max_resplits=20),
-    Measure("classifier AUC, convolutions", distances.convolution_features, linear_classifier, perfect=0.5, max_resplits=50),
+    Measure(
+        "autocorrelation distance of squares", _square_products, distances.autocorrelation_distance
+    ),
+    Measure(
+        "classifier AUC, boosted trees",
+        window_features,
+        two_sample.boosted_trees,
+        perfect=0.5,
+        max_resplits=20,
+    ),
+    Measure(
+        "classifier AUC, convolutions",
+        distances.convolution_features,
+        linear_classifier,
+        perfect=0.5,
+        max_resplits=50,
+    ),
     Measure("density", window_features, distances.density, perfect=1.0, max_resplits=50),
     Measure("coverage", window_features, distances.coverage, perfect=1 - 2.0**-5, max_resplits=50),
     Measure("MMD squared", window_features, distances.mmd_squared, max_resplits=50),
-    Measure("effective rank ratio", _values, _rank_ratio, perfect=1.0, is_ratio=True, max_resplits=40),
+    Measure(
+        "effective rank ratio", _values, _rank_ratio, perfect=1.0, is_ratio=True, max_resplits=40
+    ),
 )
 
 
@@ -117,7 +139,14 @@ class RealFloor:
         measures: The measures.
     """
 
-    def __init__(self, real: np.ndarray, later_real: np.ndarray, num_resplits: int, seed: int = 0, measures: Sequence[Measure] = MEASURES):
+    def __init__(
+        self,
+        real: np.ndarray,
+        later_real: np.ndarray,
+        num_resplits: int,
+        seed: int = 0,
+        measures: Sequence[Measure] = MEASURES,
+    ):
         self.measures, self.num_windows = tuple(measures), min(len(real), len(later_real))
         self._offset, self._unit = np.mean(real, dtype=np.float64), np.std(real, dtype=np.float64)
         real, later_real = self._standardised(real), self._standardised(later_real)
@@ -128,9 +157,16 @@ class RealFloor:
         """Mean departure of each measure for real windows compared with real windows."""
         for measure in self.measures:
             pooled = np.concatenate(describe(measure.describe))
-            with threadpool_limits(1):  # on a busy machine, several threads that wait for each other are ten times slower
-                values = [measure.compare(pooled[first], pooled[second]) for first, second in splits[: measure.max_resplits]]
-            self.departures[measure.name] = float(np.mean([measure.departure(value) for value in values]))
+            with threadpool_limits(
+                1
+            ):  # on a busy machine, several threads that wait for each other are ten times slower
+                values = [
+                    measure.compare(pooled[first], pooled[second])
+                    for first, second in splits[: measure.max_resplits]
+                ]
+            self.departures[measure.name] = float(
+                np.mean([measure.departure(value) for value in values])
+            )
 
     def evaluate(self, generated: np.ndarray) -> list[Row]:
         """Compares generated windows with the real windows.
@@ -148,17 +184,29 @@ class RealFloor:
         for measure in self.measures:
             with threadpool_limits(1):
                 value = measure.compare(describe(measure.describe), self._real[measure.describe])
-            rows.append(Row(measure.name, value, measure.departure(value) / max(self.departures[measure.name], 1e-12)))
+            rows.append(
+                Row(
+                    measure.name,
+                    value,
+                    measure.departure(value) / max(self.departures[measure.name], 1e-12),
+                )
+            )
         return rows
 
     def _standardised(self, windows: np.ndarray) -> np.ndarray:
         """The first `num_windows` windows, standardised by the real windows and rounded."""
-        standardised = (np.asarray(windows[: self.num_windows], np.float64) - self._offset) / self._unit
+        standardised = (
+            np.asarray(windows[: self.num_windows], np.float64) - self._offset
+        ) / self._unit
         return np.round(standardised, _DECIMALS).astype(np.float32)
 
-    def _resplits(self, num_resplits: int, rng: np.random.Generator) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def _resplits(
+        self, num_resplits: int, rng: np.random.Generator
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yields pairs of index arrays. Blocks in time are assigned to the halves at random; each half keeps the order of time."""
-        blocks = np.array_split(np.arange(2 * self.num_windows), max(2, 2 * self.num_windows // _BLOCK))
+        blocks = np.array_split(
+            np.arange(2 * self.num_windows), max(2, 2 * self.num_windows // _BLOCK)
+        )
         for _ in range(num_resplits):
             order = np.concatenate([blocks[chosen] for chosen in rng.permutation(len(blocks))])
             yield np.sort(order[: self.num_windows]), np.sort(order[self.num_windows :])

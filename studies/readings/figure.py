@@ -16,7 +16,10 @@ def draw(data: dict) -> matplotlib.figure.Figure:
     """Draws the shares that `summary.shares` returns, under `shares`."""
     shares: pd.DataFrame = data["shares"]
     figure, down = new_sheet(
-        DOUBLE, 3.6, "C6 fails in nearly all runs; C4 and C5 turn", "Share of runs; empty where a reading changes nothing."
+        DOUBLE,
+        3.6,
+        "C6 fails in nearly all runs; C4 and C5 turn",
+        "Share of runs; empty where a reading changes nothing.",
     )
     axes = panels(figure, down + 0.35, 1, 1, right=0.1)[0, 0]
     box = axes.get_position()
@@ -24,18 +27,38 @@ def draw(data: dict) -> matplotlib.figure.Figure:
     readings = list(READINGS)
     for row in shares.itertuples(index=False):
         part = shares[(shares["reading"] == row.reading) & (shares["claim"] == row.claim)]
-        before = sum(part.loc[part["verdict"] == verdict, "share"].sum() for verdict in list(COLORS)[: list(COLORS).index(row.verdict)])
+        before = sum(
+            part.loc[part["verdict"] == verdict, "share"].sum()
+            for verdict in list(COLORS)[: list(COLORS).index(row.verdict)]
+        )
         left = int(row.claim[1]) - 1 + 0.86 * before
         axes.barh(
-            readings.index(row.reading), 0.86 * row.share, left=left, height=0.7, color=COLORS[row.verdict], edgecolor=LINE, linewidth=0.3
+            readings.index(row.reading),
+            0.86 * row.share,
+            left=left,
+            height=0.7,
+            color=COLORS[row.verdict],
+            edgecolor=LINE,
+            linewidth=0.3,
         )
     axes.set_yticks(range(len(readings)), readings)
-    axes.set_xticks([number + 0.43 for number in range(len(CLAIMS))], [claim.id for claim in CLAIMS])
+    axes.set_xticks(
+        [number + 0.43 for number in range(len(CLAIMS))], [claim.id for claim in CLAIMS]
+    )
     axes.set(xlim=(-0.05, len(CLAIMS)), ylim=(len(readings) - 0.4, -0.6))
     axes.tick_params(length=0, labelcolor=REAL)
     axes.spines[["left", "bottom"]].set_visible(False)
     for number, (verdict, color) in enumerate(COLORS.items()):
-        axes.scatter(1 + 2.5 * number, -1.05, s=36, marker="s", color=color, edgecolor=LINE, linewidth=0.3, clip_on=False)
+        axes.scatter(
+            1 + 2.5 * number,
+            -1.05,
+            s=36,
+            marker="s",
+            color=color,
+            edgecolor=LINE,
+            linewidth=0.3,
+            clip_on=False,
+        )
         axes.text(1.2 + 2.5 * number, -1.05, verdict, va="center", color=QUIET)
     return figure
 

@@ -22,8 +22,15 @@ def measure(run: Run, budget: str, cache: Path) -> pd.DataFrame:
         cache: Folder of cached stages.
     """
     rounds = {} if run.reading == "reference" else {"rounds": 1}
-    pipeline = Pipeline(make_settings(budget, seed=run.seed, **rounds, **READINGS[run.reading]), Stages(cache, tell=tell))
-    rows = [(*run, claim.id, name, value) for claim in CLAIMS for name, value in claim.measure(pipeline).items()]
+    pipeline = Pipeline(
+        make_settings(budget, seed=run.seed, **rounds, **READINGS[run.reading]),
+        Stages(cache, tell=tell),
+    )
+    rows = [
+        (*run, claim.id, name, value)
+        for claim in CLAIMS
+        for name, value in claim.measure(pipeline).items()
+    ]
     return pd.DataFrame(rows, columns=[*KEYS, "claim", "name", "value"])
 
 

@@ -63,12 +63,16 @@ def runs(num_reference: int, num_other: int, on_another: bool = False) -> list[R
         for reading in READINGS:
             if seed < (num_reference if reading == "reference" else num_other):
                 planned += [
-                    Run(reading, rounding, seed) for rounding in ("oneDNN", "Eigen") if reading == "reference" or rounding == "oneDNN"
+                    Run(reading, rounding, seed)
+                    for rounding in ("oneDNN", "Eigen")
+                    if reading == "reference" or rounding == "oneDNN"
                 ]
     return planned
 
 
-def collect(planned: list[Run], budget: str, cache: Path, folder: Path, tell: Callable[[str], None]) -> pd.DataFrame:
+def collect(
+    planned: list[Run], budget: str, cache: Path, folder: Path, tell: Callable[[str], None]
+) -> pd.DataFrame:
     """Does the runs that the table does not have yet.
 
     Args:
@@ -82,17 +86,27 @@ def collect(planned: list[Run], budget: str, cache: Path, folder: Path, tell: Ca
         The table: one row for each measurement of each claim in each run.
     """
     path = folder / TABLE
-    table = pd.read_parquet(path) if path.is_file() else pd.DataFrame(columns=[*KEYS, "claim", "name", "value"])
+    table = (
+        pd.read_parquet(path)
+        if path.is_file()
+        else pd.DataFrame(columns=[*KEYS, "claim", "name", "value"])
+    )
     done = {Run(*row) for row in table[KEYS].drop_duplicates().itertuples(index=False)}
     for number, run in enumerate(planned, 1):
-        tell(f"run {number} of {len(planned)}: {run.reading}, {run.rounding}, seed {run.seed}{' (in the table)' if run in done else ''}")
+        tell(
+            f"run {number} of {len(planned)}: {run.reading}, {run.rounding}, seed {run.seed}{' (in the table)' if run in done else ''}"
+        )
         if run in done:
             continue
         measured = folder / "run.parquet"
         arguments = ["-m", "studies.readings.one", *run, budget, cache / run.rounding, measured]
         environment = os.environ | {"TF_ENABLE_ONEDNN_OPTS": ROUNDINGS[run.rounding]}
         subprocess.run([sys.executable, *map(str, arguments)], env=environment, check=True)
-        table = pd.concat([table, pd.read_parquet(measured)], ignore_index=True) if len(table) else pd.read_parquet(measured)
+        table = (
+            pd.concat([table, pd.read_parquet(measured)], ignore_index=True)
+            if len(table)
+            else pd.read_parquet(measured)
+        )
         with replace_file(path) as temporary:
             table.to_parquet(temporary, compression="zstd", index=False)
         measured.unlink()

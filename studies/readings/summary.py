@@ -35,7 +35,9 @@ def touches(reading: str, claim: str) -> bool:
     if reading == "reference":
         return True
     changed = make_settings(**READINGS[reading])
-    return claim != "C4" and any(changed.of(stage) != make_settings().of(stage) for stage in TOUCHED_BY[claim])
+    return claim != "C4" and any(
+        changed.of(stage) != make_settings().of(stage) for stage in TOUCHED_BY[claim]
+    )
 
 
 def verdicts(table: pd.DataFrame) -> pd.DataFrame:
@@ -50,7 +52,13 @@ def verdicts(table: pd.DataFrame) -> pd.DataFrame:
     limits = {claim.id: claim.limits for claim in CLAIMS}
     rows = []
     for (*run, claim), part in table.groupby([*KEYS, "claim"], sort=False):
-        rows.append((*run, claim, verdict(limits[claim], dict(zip(part["name"], part["value"], strict=True)))))
+        rows.append(
+            (
+                *run,
+                claim,
+                verdict(limits[claim], dict(zip(part["name"], part["value"], strict=True))),
+            )
+        )
     return pd.DataFrame(rows, columns=[*KEYS, "claim", "verdict"])
 
 
@@ -66,8 +74,15 @@ def decide(found: pd.DataFrame, claim: str) -> dict[str, Any]:
         `decided_by`, the readings that differ if it is undecided, or None.
     """
     of_claim = found[found["claim"] == claim]
-    counts = {reading: collections.Counter(part["verdict"]) for reading, part in of_claim.groupby("reading", sort=False)}
-    of_reading = {reading: count.most_common(1)[0][0] for reading, count in counts.items() if touches(reading, claim)}
+    counts = {
+        reading: collections.Counter(part["verdict"])
+        for reading, part in of_claim.groupby("reading", sort=False)
+    }
+    of_reading = {
+        reading: count.most_common(1)[0][0]
+        for reading, count in counts.items()
+        if touches(reading, claim)
+    }
     common, agreeing = counts["reference"].most_common(1)[0]
     total = counts["reference"].total()
     others = {reading: each for reading, each in of_reading.items() if reading != "reference"}
@@ -91,12 +106,29 @@ def publish(table: pd.DataFrame) -> dict[str, Any]:
             decided["verdict"] = OF_UNTESTED.get(decided["verdict"], decided["verdict"])
         values = reference[reference["claim"] == claim.id].groupby("name")["value"]
         low, high = values.min(), values.max()
-        ranges = {name: [float(low[name]), float(high[name])] for name in dict.fromkeys(limit.name for limit in claim.limits)}
+        ranges = {
+            name: [float(low[name]), float(high[name])]
+            for name in dict.fromkeys(limit.name for limit in claim.limits)
+        }
         claims[claim.id] = decided | {"ranges": ranges}
     tested = [claims[claim.id]["verdict"] for claim in CLAIMS if claim.is_tested]
-    sign = "[¬Re]" if NOT_REPRODUCED in tested else "[Re]" if set(tested) == {REPRODUCED} else "[Re, in part]"
-    seeds, roundings, readings = reference["seed"].nunique(), reference["rounding"].nunique(), table["reading"].nunique()
-    return {"title": sign, "basis": f"seeds of the reference: {seeds}, roundings: {roundings}; readings: {readings}", "claims": claims}
+    sign = (
+        "[¬Re]"
+        if NOT_REPRODUCED in tested
+        else "[Re]"
+        if set(tested) == {REPRODUCED}
+        else "[Re, in part]"
+    )
+    seeds, roundings, readings = (
+        reference["seed"].nunique(),
+        reference["rounding"].nunique(),
+        table["reading"].nunique(),
+    )
+    return {
+        "title": sign,
+        "basis": f"seeds of the reference: {seeds}, roundings: {roundings}; readings: {readings}",
+        "claims": claims,
+    }
 
 
 def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
@@ -115,13 +147,25 @@ def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         for claim in claims:
             given = collections.Counter(runs.loc[runs["claim"] == claim, "verdict"])
             verdict, number = given.most_common(1)[0] if given else ("", 0)
-            row.append(f"{verdict} {number}/{given.total()}" if given and touches(reading, claim) else "")
+            row.append(
+                f"{verdict} {number}/{given.total()}" if given and touches(reading, claim) else ""
+            )
         rows.append(row)
     return ["reading", "runs", *claims], rows
 
 
 def shares(found: pd.DataFrame) -> pd.DataFrame:
     """The share of runs with each verdict, by reading, claim and verdict, for the figure and the table of the README."""
-    is_touched = np.array([touches(reading, claim) for reading, claim in zip(found["reading"], found["claim"], strict=True)], bool)
-    counts = found[is_touched].groupby(["reading", "claim"], sort=False)["verdict"].value_counts(normalize=True)
+    is_touched = np.array(
+        [
+            touches(reading, claim)
+            for reading, claim in zip(found["reading"], found["claim"], strict=True)
+        ],
+        bool,
+    )
+    counts = (
+        found[is_touched]
+        .groupby(["reading", "claim"], sort=False)["verdict"]
+        .value_counts(normalize=True)
+    )
     return counts.rename("share").reset_index()

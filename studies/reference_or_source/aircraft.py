@@ -6,7 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from studies.battery.faults import measure
-from studies.reference_or_source.aircraft_faults import ALL, ONSET, UNIT_SAMPLES, Fault, sizes_over_flight
+from studies.reference_or_source.aircraft_faults import (
+    ALL,
+    ONSET,
+    UNIT_SAMPLES,
+    Fault,
+    sizes_over_flight,
+)
 from studies.reference_or_source.aircraft_flight import Vehicle, draw_wind, fly, import_jsbsim
 from studies.reference_or_source.aircraft_point_mass import Constants, simulate
 
@@ -33,7 +39,10 @@ NOISE_SD = (0.5, 30.0, 0.05, 0.1, 0.1, 6.0)
 RESOLUTION = (0.25, 16.0, 0.05, 0.1, 0.1, 4.0)
 """Resolution of each channel's sensor, in the channel's unit."""
 _HOLDS_S = (60, 120)  # shortest and longest time between two steps of a target; the mean is 90 s
-_TARGETS = ((8_000, 16_000), 1_500, 100), ((230, 290), 20, 1)  # limits, largest step and grid of altitude in feet and airspeed in knots
+_TARGETS = (
+    ((8_000, 16_000), 1_500, 100),
+    ((230, 290), 20, 1),
+)  # limits, largest step and grid of altitude in feet and airspeed in knots
 
 
 class Aircraft:
@@ -68,10 +77,17 @@ class Aircraft:
             Target altitude in feet and airspeed in knots, float64 of shape `(num_units * unit_samples, 2)`.
         """
         drawn = [_draw_target(*each, rng) for _ in range(num_units) for each in _TARGETS]
-        return np.reshape(drawn, (num_units, len(_TARGETS), UNIT_SAMPLES)).swapaxes(1, 2).reshape(-1, len(_TARGETS))
+        return (
+            np.reshape(drawn, (num_units, len(_TARGETS), UNIT_SAMPLES))
+            .swapaxes(1, 2)
+            .reshape(-1, len(_TARGETS))
+        )
 
     def run_real(
-        self, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), rng: np.random.Generator | None = None
+        self,
+        commands: np.ndarray,
+        faults: Sequence[Fault | None] = (None,),
+        rng: np.random.Generator | None = None,
     ) -> list[np.ndarray]:
         """Runs the fine simulator.
 
@@ -88,11 +104,19 @@ class Aircraft:
             InputError: If JSBSim is not installed, or `commands` cannot be flown.
         """
         flights = _as_flights(commands)
-        winds = [None] * len(flights) if rng is None else [draw_wind(own) for own in rng.spawn(len(flights))]
+        winds = (
+            [None] * len(flights)
+            if rng is None
+            else [draw_wind(own) for own in rng.spawn(len(flights))]
+        )
         return [_fly_all(flights, Vehicle(), fault, winds) for fault in faults]
 
     def run_coarse(
-        self, simulator: str, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), values: Sequence[float] | None = None
+        self,
+        simulator: str,
+        commands: np.ndarray,
+        faults: Sequence[Fault | None] = (None,),
+        values: Sequence[float] | None = None,
     ) -> list[np.ndarray]:
         """Runs a coarse simulator, in calm air.
 
@@ -115,7 +139,9 @@ class Aircraft:
                 run = _fly_all(flights, VEHICLES[simulator], fault, [None] * len(flights))
             else:
                 constants = Constants() if values is None else Constants(*map(float, values))
-                run = simulate(flights, sizes_over_flight(fault), POINT_MASSES[simulator], constants).reshape(-1, len(self.channels))
+                run = simulate(
+                    flights, sizes_over_flight(fault), POINT_MASSES[simulator], constants
+                ).reshape(-1, len(self.channels))
             found.append(np.concatenate([run, commands], axis=1).astype(np.float32))
         return found
 
@@ -123,19 +149,25 @@ class Aircraft:
         """Returns whether a coarse simulator can express a kind of fault: a point mass has no elevator."""
         return simulator in VEHICLES or kind != "elevator"
 
-    def measure(self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
+    def measure(
+        self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0
+    ) -> np.ndarray:
         """Measures channels of shape `(samples, 6)` with sensors that add white noise, times `scale`, and round; returns float32."""
         return measure(values, scale * np.array(NOISE_SD), np.array(RESOLUTION), rng)
 
 
-def _draw_target(limits: tuple[int, int], step: int, grid: int, rng: np.random.Generator) -> np.ndarray:
+def _draw_target(
+    limits: tuple[int, int], step: int, grid: int, rng: np.random.Generator
+) -> np.ndarray:
     """Draws one target over one flight: a random walk that limits reflect, in steps of at most `step`, rounded to a grid."""
     target, value, begin = np.empty(UNIT_SAMPLES), rng.uniform(*limits), 0
     while begin < UNIT_SAMPLES:
         end = begin + int(rng.integers(_HOLDS_S[0], _HOLDS_S[1] + 1))
         target[begin:end] = np.rint(value / grid) * grid
         value += rng.uniform(-step, step)
-        value = limits[0] + abs(value - limits[0])  # reflected at the lower limit, and then at the upper one
+        value = limits[0] + abs(
+            value - limits[0]
+        )  # reflected at the lower limit, and then at the upper one
         value = limits[1] - abs(limits[1] - value)
         begin = end
     return target
@@ -146,7 +178,11 @@ def _as_flights(commands: np.ndarray) -> np.ndarray:
     return commands.astype(float).reshape(-1, UNIT_SAMPLES, len(COMMANDS))
 
 
-def _fly_all(flights: np.ndarray, vehicle: Vehicle, fault: Fault | None, winds: list[np.ndarray | None]) -> np.ndarray:
+def _fly_all(
+    flights: np.ndarray, vehicle: Vehicle, fault: Fault | None, winds: list[np.ndarray | None]
+) -> np.ndarray:
     """Runs JSBSim over flights, each with a simulator of its own, so that no flight depends on the ones before it."""
     sizes = sizes_over_flight(fault)
-    return np.concatenate([fly(targets, vehicle, sizes, wind) for targets, wind in zip(flights, winds, strict=True)]).astype(np.float32)
+    return np.concatenate(
+        [fly(targets, vehicle, sizes, wind) for targets, wind in zip(flights, winds, strict=True)]
+    ).astype(np.float32)

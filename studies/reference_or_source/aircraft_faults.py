@@ -53,6 +53,9 @@ def sizes_over_flight(fault: Fault | None) -> dict[str, np.ndarray]:
     sizes = {kind: np.zeros(UNIT_SAMPLES) for kind in SIZES}
     if fault is not None:
         since = np.arange(1, UNIT_SAMPLES - ONSET + 1)
-        growth = {"both engines": since / len(since), "icing": np.minimum(since / _ICING_SAMPLES, 1.0)}
+        growth = {
+            "both engines": since / len(since),
+            "icing": np.minimum(since / _ICING_SAMPLES, 1.0),
+        }
         sizes[fault.kind][ONSET:] = fault.size * growth.get(fault.kind, np.ones(len(since)))
     return sizes

@@ -20,13 +20,23 @@ CONTROLS_A_SECOND = 10
 """How often the autopilot acts; the wind changes as often."""
 MOST_CLIMB, MOST_ACCELERATION = 25.0, 0.6
 """Largest climb rate in feet a second and acceleration in knots a second that the autopilot asks for."""
-_ALTITUDE_S, _CLIMB_S, _SEEN_S = 15.0, 3.0, 1.0  # time constants: error of altitude to climb rate, its smoothing, the airspeed's smoothing
+_ALTITUDE_S, _CLIMB_S, _SEEN_S = (
+    15.0,
+    3.0,
+    1.0,
+)  # time constants: error of altitude to climb rate, its smoothing, the airspeed's smoothing
 _MOST_SPEED_ERROR = 8.0  # knots, to which the throttle answers
 _STEPS_A_CONTROL = 3  # 30 steps of the simulator a second
-_FUEL_LB, _WING_SQFT = 15_000.0, 1_317.0  # of each tank and of the wing, as in JSBSim's description of the A320
+_FUEL_LB, _WING_SQFT = (
+    15_000.0,
+    1_317.0,
+)  # of each tank and of the wing, as in JSBSim's description of the A320
 _DRAG_OF_SPEEDBRAKE = 0.04  # drag coefficient of the whole speed brake, which stands for other drag
 _DRAG_AT_ZERO_LIFT = 0.016
-_WINDS = ((1.0, 8.0), (0.8, 4.0))  # standard deviation in feet a second and correlation time in seconds, along and vertical
+_WINDS = (
+    (1.0, 8.0),
+    (0.8, 4.0),
+)  # standard deviation in feet a second and correlation time in seconds, along and vertical
 
 _READ = (
     "position/h-sl-ft", "velocities/h-dot-fps", "velocities/vc-kts", "velocities/vtrue-fps", "attitude/theta-rad", "velocities/q-rad_sec",
@@ -70,7 +80,9 @@ def import_jsbsim() -> Any:
         raise InputError(
             "Expected JSBSim, which simulates the aircraft. Received: no such package. Install it: pip install 'enhsim_tf[aircraft]'."
         ) from None
-    jsbsim.FGJSBBase().debug_lvl = 0  # before the first simulator, whose banner is printed at its birth
+    jsbsim.FGJSBBase().debug_lvl = (
+        0  # before the first simulator, whose banner is printed at its birth
+    )
     return jsbsim
 
 
@@ -83,10 +95,18 @@ def draw_wind(rng: np.random.Generator) -> np.ndarray:
     from studies.common.noise_processes import first_order
 
     number = UNIT_SAMPLES * CONTROLS_A_SECOND
-    return np.stack([sd * first_order(number, np.exp(-1 / (time_s * CONTROLS_A_SECOND)), rng) for sd, time_s in _WINDS], axis=1)
+    return np.stack(
+        [
+            sd * first_order(number, np.exp(-1 / (time_s * CONTROLS_A_SECOND)), rng)
+            for sd, time_s in _WINDS
+        ],
+        axis=1,
+    )
 
 
-def fly(targets: np.ndarray, vehicle: Vehicle, sizes: dict[str, np.ndarray], wind: np.ndarray | None) -> np.ndarray:
+def fly(
+    targets: np.ndarray, vehicle: Vehicle, sizes: dict[str, np.ndarray], wind: np.ndarray | None
+) -> np.ndarray:
     """Simulates one flight, which starts trimmed at its first targets.
 
     Args:
@@ -104,19 +124,43 @@ def fly(targets: np.ndarray, vehicle: Vehicle, sizes: dict[str, np.ndarray], win
     """
     model = _trimmed(*targets[0].tolist(), vehicle)
     nodes = model.get_property_manager()
-    altitude, climb, airspeed, true_speed, pitch, pitch_rate, roll, roll_rate, heading, n1_left, n1_right = (
-        nodes.get_node(name).get_double_value for name in _READ
+    (
+        altitude,
+        climb,
+        airspeed,
+        true_speed,
+        pitch,
+        pitch_rate,
+        roll,
+        roll_rate,
+        heading,
+        n1_left,
+        n1_right,
+    ) = (nodes.get_node(name).get_double_value for name in _READ)
+    put_elevator, put_aileron, put_left, put_right, put_along, put_down = (
+        nodes.get_node(name).set_double_value for name in _WRITTEN
     )
-    put_elevator, put_aileron, put_left, put_right, put_along, put_down = (nodes.get_node(name).set_double_value for name in _WRITTEN)
-    trimmed_elevator, trimmed_throttle = model["fcs/pitch-trim-cmd-norm"] / vehicle.elevator, model["fcs/throttle-cmd-norm"]
-    model["fcs/pitch-trim-cmd-norm"] = 0.0  # the elevator's command holds the trim, so that a fault of the elevator reaches it
+    trimmed_elevator, trimmed_throttle = (
+        model["fcs/pitch-trim-cmd-norm"] / vehicle.elevator,
+        model["fcs/throttle-cmd-norm"],
+    )
+    model["fcs/pitch-trim-cmd-norm"] = (
+        0.0  # the elevator's command holds the trim, so that a fault of the elevator reaches it
+    )
     trimmed_pitch, wanted_speed, seen_speed = pitch(), airspeed(), airspeed()
     wanted_climb = path_sum = speed_sum = 0.0
     dt, gains, found = 1 / CONTROLS_A_SECOND, vehicle.gains, np.empty((UNIT_SAMPLES, 6))
     winds = itertools.repeat((0.0, 0.0)) if wind is None else iter(wind.tolist())
     for sample, (target_altitude, target_speed) in enumerate(targets.tolist()):
         size = {kind: float(values[sample]) for kind, values in sizes.items()}
-        found[sample] = airspeed() + size["pitot"], 60 * climb(), math.degrees(pitch()), n1_left(), n1_right(), altitude()
+        found[sample] = (
+            airspeed() + size["pitot"],
+            60 * climb(),
+            math.degrees(pitch()),
+            n1_left(),
+            n1_right(),
+            altitude(),
+        )
         _apply(model, vehicle, size, size["icing"] - sizes["icing"][max(sample - 1, 0)])
         for _ in range(CONTROLS_A_SECOND):
             wanted = _limit(gains * (target_altitude - altitude()) / _ALTITUDE_S, MOST_CLIMB)
@@ -124,14 +168,22 @@ def fly(targets: np.ndarray, vehicle: Vehicle, sizes: dict[str, np.ndarray], win
             speed = true_speed()
             path_error = (wanted_climb - climb()) / speed
             path_sum += path_error * dt
-            wanted_pitch = trimmed_pitch + wanted_climb / speed + gains * (0.5 * path_error + 0.15 * path_sum)
-            wanted_elevator = trimmed_elevator + gains * (3.0 * (pitch() - wanted_pitch) + 3.0 * pitch_rate())
+            wanted_pitch = (
+                trimmed_pitch + wanted_climb / speed + gains * (0.5 * path_error + 0.15 * path_sum)
+            )
+            wanted_elevator = trimmed_elevator + gains * (
+                3.0 * (pitch() - wanted_pitch) + 3.0 * pitch_rate()
+            )
             put_elevator(vehicle.elevator * (1 - size["elevator"]) * wanted_elevator)
             put_aileron(-roll() - roll_rate() - 0.5 * math.sin(heading()))
             seen_speed += (airspeed() + size["pitot"] - seen_speed) * dt / _SEEN_S
             wanted_speed += _limit(target_speed - wanted_speed, MOST_ACCELERATION * dt)
             speed_error = _limit(wanted_speed - seen_speed, _MOST_SPEED_ERROR)
-            throttle = trimmed_throttle + gains * (0.025 * speed_error + 0.0025 * speed_sum) + 0.009 * wanted_climb
+            throttle = (
+                trimmed_throttle
+                + gains * (0.025 * speed_error + 0.0025 * speed_sum)
+                + 0.009 * wanted_climb
+            )
             if 0 < throttle < 1:  # the sum waits while the throttle is at its stop
                 speed_sum += speed_error * dt
             throttle = min(max(throttle, 0.0), 1.0)
@@ -157,9 +209,17 @@ def _trimmed(altitude_ft: float, airspeed_kt: float, vehicle: Vehicle) -> Any:
     model.set_debug_level(0)
     model.load_model("A320")
     model.set_dt(1 / (CONTROLS_A_SECOND * _STEPS_A_CONTROL))
-    start = {"ic/h-sl-ft": altitude_ft, "ic/vc-kts": airspeed_kt, "ic/gamma-deg": 0.0, "ic/psi-true-deg": 0.0}
+    start = {
+        "ic/h-sl-ft": altitude_ft,
+        "ic/vc-kts": airspeed_kt,
+        "ic/gamma-deg": 0.0,
+        "ic/psi-true-deg": 0.0,
+    }
     gear = {"gear/gear-cmd-norm": 0.0, "gear/gear-pos-norm": 0.0}
-    drag = dict.fromkeys(("fcs/speedbrake-cmd-norm", "fcs/speedbrake-pos-norm"), _more_drag(vehicle) / _DRAG_OF_SPEEDBRAKE)
+    drag = dict.fromkeys(
+        ("fcs/speedbrake-cmd-norm", "fcs/speedbrake-pos-norm"),
+        _more_drag(vehicle) / _DRAG_OF_SPEEDBRAKE,
+    )
     fuel = {f"propulsion/tank[{side}]/contents-lbs": vehicle.fuel * _FUEL_LB for side in (0, 1)}
     for name, value in (start | gear | drag | fuel).items():
         model[name] = value
@@ -184,9 +244,13 @@ def _more_drag(vehicle: Vehicle) -> float:
 def _apply(model: Any, vehicle: Vehicle, size: dict[str, float], new_ice: float) -> None:
     """Sets what faults of these sizes change in the simulator beside its controls."""
     for side in (0, 1):
-        model[f"propulsion/engine[{side}]/bleed-factor"] = 1 - vehicle.thrust * (1 - size["both engines"])
+        model[f"propulsion/engine[{side}]/bleed-factor"] = 1 - vehicle.thrust * (
+            1 - size["both engines"]
+        )
         if new_ice:  # the tanks carry its weight: JSBSim's A320 has no other weight that can change
             model[f"propulsion/tank[{side}]/contents-lbs"] += new_ice * ICE_LB / 2
     model["propulsion/tank[0]/external-flow-rate-pps"] = -size["fuel leak"]
     model["metrics/Sw-sqft"] = _WING_SQFT * (1 - size["icing"])
-    model["fcs/speedbrake-cmd-norm"] = (_more_drag(vehicle) + size["icing"] * ICE_DRAG) / _DRAG_OF_SPEEDBRAKE
+    model["fcs/speedbrake-cmd-norm"] = (
+        _more_drag(vehicle) + size["icing"] * ICE_DRAG
+    ) / _DRAG_OF_SPEEDBRAKE

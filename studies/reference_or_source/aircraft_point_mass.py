@@ -36,12 +36,22 @@ _WEIGHT_LB, _WING_SQFT, _ASPECT_RATIO = 141_000.0, 1_317.0, 9.4
 _SPAN_EFFICIENCY = 0.8
 _LIFT_SLOPE = 2 * np.pi * _ASPECT_RATIO / (_ASPECT_RATIO + 2)  # per radian, of an elliptic wing
 _ZERO_LIFT_PITCH = np.deg2rad(-2.0)
-_THRUST_LB, _IDLE_N1 = 50_000.0, 30.0  # both engines at sea level; thrust goes with the air's density and the square of the throttle
-_GRAVITY, _KNOT, _AIR = 32.174, 1.6878, 0.0023769  # feet a second squared; feet a second; slugs a cubic foot at sea level
+_THRUST_LB, _IDLE_N1 = (
+    50_000.0,
+    30.0,
+)  # both engines at sea level; thrust goes with the air's density and the square of the throttle
+_GRAVITY, _KNOT, _AIR = (
+    32.174,
+    1.6878,
+    0.0023769,
+)  # feet a second squared; feet a second; slugs a cubic foot at sea level
 
 
 def simulate(
-    targets: np.ndarray, sizes: dict[str, np.ndarray], has_climb_lag: bool = True, constants: Constants = Constants()
+    targets: np.ndarray,
+    sizes: dict[str, np.ndarray],
+    has_climb_lag: bool = True,
+    constants: Constants = Constants(),
 ) -> np.ndarray:
     """Simulates flights, each of which starts level at its first targets.
 
@@ -58,25 +68,42 @@ def simulate(
     keeps_climb, keeps_speed, keeps_engine = np.exp(-1 / lags) * [has_climb_lag, 1, 1]
     leaked = np.cumsum(sizes["fuel leak"])
     altitude, airspeed = targets[:, 0].T.astype(float)
-    climb, change, engines, found = np.zeros(len(targets)), np.zeros(len(targets)), None, np.empty((*targets.shape[:2], 6))
+    climb, change, engines, found = (
+        np.zeros(len(targets)),
+        np.zeros(len(targets)),
+        None,
+        np.empty((*targets.shape[:2], 6)),
+    )
     for sample in range(UNIT_SAMPLES):
         pitot, ice = sizes["pitot"][sample], sizes["icing"][sample]
         weight = _WEIGHT_LB - leaked[sample] + ice * ICE_LB
-        density = (1 - 6.8756e-6 * altitude) ** 4.2559  # as a share of that at sea level, in the standard atmosphere
+        density = (
+            1 - 6.8756e-6 * altitude
+        ) ** 4.2559  # as a share of that at sea level, in the standard atmosphere
         pressure = 0.5 * _AIR * (airspeed * _KNOT) ** 2 * _WING_SQFT  # dynamic pressure and wing
         path = climb / (airspeed * _KNOT / np.sqrt(density))
         lift = weight / pressure
-        drag = constants.drag + ice * ICE_DRAG + lift**2 / (np.pi * _ASPECT_RATIO * _SPAN_EFFICIENCY)
+        drag = (
+            constants.drag + ice * ICE_DRAG + lift**2 / (np.pi * _ASPECT_RATIO * _SPAN_EFFICIENCY)
+        )
         force = drag * pressure + weight * (path + change * _KNOT / np.sqrt(density) / _GRAVITY)
         at_full = _THRUST_LB * density * (1 - sizes["both engines"][sample])
         shares = np.array([1 - sizes["left engine"][sample], 1.0])
         throttle = np.minimum(np.sqrt(np.maximum(force, 0) / at_full * 2 / (shares**2).sum()), 1.0)
         wanted_engines = _IDLE_N1 + (100 - _IDLE_N1) * throttle * shares[:, None]
-        engines = wanted_engines if engines is None else wanted_engines + (engines - wanted_engines) * keeps_engine
+        engines = (
+            wanted_engines
+            if engines is None
+            else wanted_engines + (engines - wanted_engines) * keeps_engine
+        )
         pitch = path + lift / (1 - ice) / _LIFT_SLOPE + _ZERO_LIFT_PITCH
-        found[:, sample] = np.stack([airspeed + pitot, 60 * climb, np.rad2deg(pitch), *engines, altitude], axis=1)
+        found[:, sample] = np.stack(
+            [airspeed + pitot, 60 * climb, np.rad2deg(pitch), *engines, altitude], axis=1
+        )
 
-        wanted_climb = np.clip((targets[:, sample, 0] - altitude) / constants.altitude_s, -MOST_CLIMB, MOST_CLIMB)
+        wanted_climb = np.clip(
+            (targets[:, sample, 0] - altitude) / constants.altitude_s, -MOST_CLIMB, MOST_CLIMB
+        )
         climb = wanted_climb + (climb - wanted_climb) * keeps_climb
         altitude = altitude + climb
         change = (targets[:, sample, 1] - airspeed - pitot) * (1 - keeps_speed)

@@ -5,7 +5,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from studies.battery.faults import ALL, SENSOR_NOISE_C, SENSOR_NOISE_V, SENSOR_STEP_C, SENSOR_STEP_V, Fault, measure
+from studies.battery.faults import (
+    ALL,
+    SENSOR_NOISE_C,
+    SENSOR_NOISE_V,
+    SENSOR_STEP_C,
+    SENSOR_STEP_V,
+    Fault,
+    measure,
+)
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, draw_load
 from studies.battery.simulate import COARSE, VEHICLE, Model, import_pybamm, simulate_all
 
@@ -49,7 +57,11 @@ class Battery:
     faults = ALL
     parameters = ("resistance", "lost_material", "lost_heat_transfer")
     """Parameters of the simulator with wrong physics that can be fitted to telemetry, all 0 in the published model."""
-    first_values, steps, bounds = np.zeros(3), np.array([0.01, 0.05, 0.3]), ((-1e-9, -1e-9, -3.0), (5.0, 4.0, 3.0))
+    first_values, steps, bounds = (
+        np.zeros(3),
+        np.array([0.01, 0.05, 0.3]),
+        ((-1e-9, -1e-9, -3.0), (5.0, 4.0, 3.0)),
+    )
     """Published values of `parameters`, the unit of each in the fit, and the limits in these units."""
 
     check_installed = staticmethod(import_pybamm)
@@ -59,7 +71,10 @@ class Battery:
         return draw_load(num_units + 1, REGIMES["gentle"], rng)[:, None]
 
     def run_real(
-        self, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), rng: np.random.Generator | None = None
+        self,
+        commands: np.ndarray,
+        faults: Sequence[Fault | None] = (None,),
+        rng: np.random.Generator | None = None,
     ) -> list[np.ndarray]:
         """Runs the fine simulator, see `Aircraft.run_real`; the load is all that moves a battery, so that nothing is drawn.
 
@@ -69,7 +84,11 @@ class Battery:
         return self._run(VEHICLE, commands, faults)
 
     def run_coarse(
-        self, simulator: str, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), values: Sequence[float] | None = None
+        self,
+        simulator: str,
+        commands: np.ndarray,
+        faults: Sequence[Fault | None] = (None,),
+        values: Sequence[float] | None = None,
     ) -> list[np.ndarray]:
         """Runs a coarse simulator, see `Aircraft.run_coarse`; `values` are those of `parameters`, None those of the simulator.
 
@@ -78,10 +97,14 @@ class Battery:
         """
         model, load = self.simulators[simulator], commands[ORBIT_SAMPLES:].astype(np.float32)
         if values is not None:
-            model = dataclasses.replace(model, **dict(zip(self.parameters, map(float, values), strict=True)))
+            model = dataclasses.replace(
+                model, **dict(zip(self.parameters, map(float, values), strict=True))
+            )
         return [np.concatenate([run, load], axis=1) for run in self._run(model, commands, faults)]
 
-    def _run(self, model: Model, commands: np.ndarray, faults: Sequence[Fault | None]) -> list[np.ndarray]:
+    def _run(
+        self, model: Model, commands: np.ndarray, faults: Sequence[Fault | None]
+    ) -> list[np.ndarray]:
         found = simulate_all(commands[:, 0], REGIMES["gentle"], faults, [model])
         return [runs[0][ORBIT_SAMPLES:] for runs in found]
 
@@ -89,7 +112,15 @@ class Battery:
         """Whether a coarse simulator can express a kind of fault: heat transfer means nothing without a temperature."""
         return not (self.simulators[simulator].is_isothermal and kind == "poor heat transfer")
 
-    def measure(self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
+    def measure(
+        self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0
+    ) -> np.ndarray:
         """Measures simulated channels of shape `(samples, 3)` with sensors whose noise is multiplied by `scale`; returns float32."""
-        noise, step = (SENSOR_NOISE_V, SENSOR_NOISE_A, SENSOR_NOISE_C), (SENSOR_STEP_V, SENSOR_STEP_A, SENSOR_STEP_C)
-        return np.stack([measure(values[:, each], scale * noise[each], step[each], rng) for each in range(3)], axis=1)
+        noise, step = (
+            (SENSOR_NOISE_V, SENSOR_NOISE_A, SENSOR_NOISE_C),
+            (SENSOR_STEP_V, SENSOR_STEP_A, SENSOR_STEP_C),
+        )
+        return np.stack(
+            [measure(values[:, each], scale * noise[each], step[each], rng) for each in range(3)],
+            axis=1,
+        )

@@ -8,7 +8,16 @@ import numpy as np
 
 from studies.reference_or_source.detectors import THRESHOLDS
 from studies.reference_or_source.recordings import COMMANDS, CRUDE, FITTED
-from studies.reference_or_source.uses import NO_SIMULATOR, REFERENCE, REFERENCE_FAULTS, SOURCE, SOURCE_FAULTS, USES, Cell, Scores
+from studies.reference_or_source.uses import (
+    NO_SIMULATOR,
+    REFERENCE,
+    REFERENCE_FAULTS,
+    SOURCE,
+    SOURCE_FAULTS,
+    USES,
+    Cell,
+    Scores,
+)
 from studies.reference_or_source.windows import Judged, windows_of
 
 NOMINAL = "nominal"
@@ -51,19 +60,39 @@ def points(system: Any, units: Sequence[int], middle: int) -> list[Point]:
     """
     found = [
         Point(
-            MAIN, "", simulator, number, USES if simulator == CRUDE else _OF_SIMULATOR, by_severity=(simulator, number) == (CRUDE, middle)
+            MAIN,
+            "",
+            simulator,
+            number,
+            USES if simulator == CRUDE else _OF_SIMULATOR,
+            by_severity=(simulator, number) == (CRUDE, middle),
         )
         for number in units
         for simulator in (CRUDE, FITTED, *(name for name in system.simulators if name != CRUDE))
     ]
     found += [Point(MAIN, "", COMMANDS, number, (REFERENCE,)) for number in units]
     one = {"simulator": CRUDE, "units": middle}
-    found += [Point("noise", f"{factor:g} times", **one, windows={"noise": factor}) for factor in (3.0, 10.0)]
-    found += [Point("commands", f"delayed, {how}", **one, uses=_OF_SIMULATOR, windows={"delay": how}) for how in ("ignored", "aligned")]
-    found.append(Point("commands", "unknown", **one, uses=_OF_SIMULATOR, cell={"is_unknown": True}))
-    found += [Point("enhancer", name, **one, uses=_OF_SIMULATOR, cell={"enhancer": name}) for name in ("random features", "convolution")]
     found += [
-        Point("noise draw", name, **one, uses=(SOURCE, SOURCE_FAULTS, REFERENCE_FAULTS), cell={"draws": name})
+        Point("noise", f"{factor:g} times", **one, windows={"noise": factor})
+        for factor in (3.0, 10.0)
+    ]
+    found += [
+        Point("commands", f"delayed, {how}", **one, uses=_OF_SIMULATOR, windows={"delay": how})
+        for how in ("ignored", "aligned")
+    ]
+    found.append(Point("commands", "unknown", **one, uses=_OF_SIMULATOR, cell={"is_unknown": True}))
+    found += [
+        Point("enhancer", name, **one, uses=_OF_SIMULATOR, cell={"enhancer": name})
+        for name in ("random features", "convolution")
+    ]
+    found += [
+        Point(
+            "noise draw",
+            name,
+            **one,
+            uses=(SOURCE, SOURCE_FAULTS, REFERENCE_FAULTS),
+            cell={"draws": name},
+        )
         for name in ("separate", "randomised")
     ]
     found.append(Point("relations", "", **one, windows={"with_relations": True}))
@@ -73,7 +102,11 @@ def points(system: Any, units: Sequence[int], middle: int) -> list[Point]:
 
 
 def rows_of(
-    system: Any, runs: Mapping[str, np.ndarray], point: Point, seed: int, alone: dict[str, Scores] | None = None
+    system: Any,
+    runs: Mapping[str, np.ndarray],
+    point: Point,
+    seed: int,
+    alone: dict[str, Scores] | None = None,
 ) -> list[dict[str, Any]]:
     """The rows of one point of the map: false alarms, and the share of windows found of each kind of fault.
 
@@ -88,25 +121,46 @@ def rows_of(
     cell, rows = Cell(windows, seed, **point.cell, alone=alone), []
     number = len(system.channels)
     coarse = (
-        windows.known.telemetry - windows.known.coarse[:, :, :number] / windows.scale if point.simulator != COMMANDS else cell.residuals
+        windows.known.telemetry - windows.known.coarse[:, :, :number] / windows.scale
+        if point.simulator != COMMANDS
+        else cell.residuals
     )
     errors = {"error": cell.residuals, "coarse_error": coarse - coarse.mean(axis=(0, 1))}
     limit = THRESHOLDS[point.level if point.axis == "threshold" else "conformal"]
-    about = {"axis": point.axis, "level": point.level, "simulator": point.simulator, "units": point.units}
+    about = {
+        "axis": point.axis,
+        "level": point.level,
+        "simulator": point.simulator,
+        "units": point.units,
+    }
     about |= {name: float(np.sqrt(np.mean(each**2))) for name, each in errors.items()}
     if point.axis == "kind":
         numbers = np.arange(len(windows.faults))
         for kind in dict.fromkeys(kind for kind, _ in windows.faults):
-            left = [each for each in numbers if each in windows.simulated and windows.faults[each][0] != kind]
+            left = [
+                each
+                for each in numbers
+                if each in windows.simulated and windows.faults[each][0] != kind
+            ]
             for scores in cell.classified(left, point.uses):
-                rows += [row for row in judged(system, windows, scores, limit, False) if row["kind"] in (kind, NOMINAL)]
+                rows += [
+                    row
+                    for row in judged(system, windows, scores, limit, False)
+                    if row["kind"] in (kind, NOMINAL)
+                ]
     else:
         for scores in cell.scores(point.uses):
             rows += judged(system, windows, scores, limit, point.by_severity)
     return [about | row for row in rows]
 
 
-def judged(system: Any, windows: Judged, scores: Scores, limit: Callable[[np.ndarray], float], by_severity: bool) -> list[dict[str, Any]]:
+def judged(
+    system: Any,
+    windows: Judged,
+    scores: Scores,
+    limit: Callable[[np.ndarray], float],
+    by_severity: bool,
+) -> list[dict[str, Any]]:
     """Counts alarms of one detector in one use at the threshold that `limit` sets on the known windows.
 
     Returns:
@@ -118,12 +172,21 @@ def judged(system: Any, windows: Judged, scores: Scores, limit: Callable[[np.nda
     days = len(nominal) * (system.window // 2) * system.interval_s / 86_400
     begins = int(nominal[0]) + int(np.sum(nominal[1:] & ~nominal[:-1]))
     about = {"use": scores.use, "detector": scores.detector}
-    rows = [about | {"kind": NOMINAL, "severity": 0.0, "alarms": float(nominal.mean()), "events": begins / days}]
+    rows = [
+        about
+        | {
+            "kind": NOMINAL,
+            "severity": 0.0,
+            "alarms": float(nominal.mean()),
+            "events": begins / days,
+        }
+    ]
     found: dict[tuple[str, float], list[float]] = {}
     for number, (kind, severity) in enumerate(windows.faults):
         share = float(alarms[windows.labels == number].mean())
         found.setdefault((kind, severity if by_severity else 0.0), []).append(share)
     return rows + [
-        about | {"kind": kind, "severity": severity, "alarms": float(np.mean(each)), "events": np.nan}
+        about
+        | {"kind": kind, "severity": severity, "alarms": float(np.mean(each)), "events": np.nan}
         for (kind, severity), each in found.items()
     ]

@@ -67,7 +67,9 @@ ONE_LINERS: Mapping[str, Callable[[int], Any]] = {
 CLASSIFIERS = ("logistic regression", "boosted trees")
 
 
-def across_folds(make: Callable[[int], Any], windows: np.ndarray, folds: np.ndarray, seed: int) -> tuple[Any, np.ndarray]:
+def across_folds(
+    make: Callable[[int], Any], windows: np.ndarray, folds: np.ndarray, seed: int
+) -> tuple[Any, np.ndarray]:
     """Fits a detector to all windows, and scores each of them by one that has not learnt from its fold.
 
     Returns:
@@ -80,7 +82,9 @@ def across_folds(make: Callable[[int], Any], windows: np.ndarray, folds: np.ndar
     return make(seed).fit(windows), by_fold(folds, score)
 
 
-def classifier(name: str, nominal: np.ndarray, faulty: np.ndarray, seed: int) -> Callable[[np.ndarray], np.ndarray]:
+def classifier(
+    name: str, nominal: np.ndarray, faulty: np.ndarray, seed: int
+) -> Callable[[np.ndarray], np.ndarray]:
     """Trains a classifier of `CLASSIFIERS`, and returns a function that scores how likely windows are faulty."""
     labels = np.repeat([0, 1], [len(nominal), len(faulty)])
     learnt = np.concatenate([nominal, faulty])
@@ -88,14 +92,18 @@ def classifier(name: str, nominal: np.ndarray, faulty: np.ndarray, seed: int) ->
         from sklearn.ensemble import HistGradientBoostingClassifier
 
         with threadpool_limits(1):
-            trees = HistGradientBoostingClassifier(max_iter=60, random_state=seed).fit(features(learnt), labels)
+            trees = HistGradientBoostingClassifier(max_iter=60, random_state=seed).fit(
+                features(learnt), labels
+            )
         return lambda windows: trees.decision_function(features(windows))
     from sklearn.linear_model import LogisticRegression
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 
     with threadpool_limits(1):
-        machine = make_pipeline(StandardScaler(), LogisticRegression(C=0.01, max_iter=200)).fit(detectors.flat(learnt), labels)
+        machine = make_pipeline(StandardScaler(), LogisticRegression(C=0.01, max_iter=200)).fit(
+            detectors.flat(learnt), labels
+        )
     return lambda windows: machine.decision_function(detectors.flat(windows))
 
 

@@ -14,7 +14,14 @@ _PENALTIES = np.geomspace(1e-1, 1e5, 7)
 _FILTERS, _WIDTH, _EPOCHS = 32, 9, 15
 
 
-def fit_map(name: str, coarse: np.ndarray, telemetry: np.ndarray, starts: np.ndarray, folds: np.ndarray, seed: int) -> Map:
+def fit_map(
+    name: str,
+    coarse: np.ndarray,
+    telemetry: np.ndarray,
+    starts: np.ndarray,
+    folds: np.ndarray,
+    seed: int,
+) -> Map:
     """Fits an enhancer.
 
     Args:
@@ -35,7 +42,9 @@ def fit_map(name: str, coarse: np.ndarray, telemetry: np.ndarray, starts: np.nda
     return Training(coarse, telemetry, starts).fit(name, seed).predict
 
 
-def _random_features(coarse: np.ndarray, telemetry: np.ndarray, folds: np.ndarray, seed: int) -> Map:
+def _random_features(
+    coarse: np.ndarray, telemetry: np.ndarray, folds: np.ndarray, seed: int
+) -> Map:
     """Ridge regression on rectified random combinations of principal components, beside the components themselves."""
     from sklearn.decomposition import PCA
     from sklearn.linear_model import Ridge
@@ -45,13 +54,23 @@ def _random_features(coarse: np.ndarray, telemetry: np.ndarray, folds: np.ndarra
     number = min(_COMPONENTS, len(coarse) - 1, coarse[0].size)
     with threadpool_limits(1):
         standard = StandardScaler().fit(coarse.reshape(len(coarse), -1))
-        components = PCA(number, svd_solver="randomized", random_state=seed).fit(standard.transform(coarse.reshape(len(coarse), -1)))
+        components = PCA(number, svd_solver="randomized", random_state=seed).fit(
+            standard.transform(coarse.reshape(len(coarse), -1))
+        )
     deviation = np.sqrt(components.explained_variance_[0])
-    kernel, shift = rng.standard_normal((number, _FEATURES)) / np.sqrt(number), rng.uniform(-1, 1, _FEATURES)
+    kernel, shift = (
+        rng.standard_normal((number, _FEATURES)) / np.sqrt(number),
+        rng.uniform(-1, 1, _FEATURES),
+    )
 
     def features(windows: np.ndarray) -> np.ndarray:
-        found = components.transform(standard.transform(windows.reshape(len(windows), -1))) / deviation
-        return np.concatenate([np.maximum(found * np.sqrt(number) @ kernel + shift, 0), found * np.sqrt(number)], axis=1).astype(np.float32)
+        found = (
+            components.transform(standard.transform(windows.reshape(len(windows), -1))) / deviation
+        )
+        return np.concatenate(
+            [np.maximum(found * np.sqrt(number) @ kernel + shift, 0), found * np.sqrt(number)],
+            axis=1,
+        ).astype(np.float32)
 
     with threadpool_limits(1):
         rows, errors = features(coarse), np.zeros(len(_PENALTIES))
@@ -60,7 +79,11 @@ def _random_features(coarse: np.ndarray, telemetry: np.ndarray, folds: np.ndarra
             machine = Ridge(penalty).fit(rows[~held_out], targets[~held_out])
             errors[place] = np.mean((machine.predict(rows[held_out]) - targets[held_out]) ** 2)
         machine = Ridge(_PENALTIES[np.argmin(errors)]).fit(rows, targets)
-    return lambda windows: machine.predict(features(windows)).reshape(len(windows), *telemetry.shape[1:]).astype(np.float32)
+    return lambda windows: (
+        machine.predict(features(windows))
+        .reshape(len(windows), *telemetry.shape[1:])
+        .astype(np.float32)
+    )
 
 
 def _convolution(coarse: np.ndarray, telemetry: np.ndarray, starts: np.ndarray, seed: int) -> Map:
@@ -70,17 +93,29 @@ def _convolution(coarse: np.ndarray, telemetry: np.ndarray, starts: np.ndarray, 
 
     ridge = Training(coarse, telemetry, starts).fit("ridge", seed)
     left = telemetry - ridge.predict(coarse)
-    mean, deviation, unit = coarse.mean(axis=(0, 1)), coarse.std(axis=(0, 1)) + 1e-6, float(left.std()) or 1.0
+    mean, deviation, unit = (
+        coarse.mean(axis=(0, 1)),
+        coarse.std(axis=(0, 1)) + 1e-6,
+        float(left.std()) or 1.0,
+    )
     keras.utils.set_random_seed(seed)
     layers: list[Any] = [keras.Input(coarse.shape[1:])]
     for number in range(2):
         layers.append(
             keras.layers.Conv1D(
-                _FILTERS, _WIDTH, padding="same", activation="relu", kernel_initializer=seeded_initialiser("he_uniform", seed + number)
+                _FILTERS,
+                _WIDTH,
+                padding="same",
+                activation="relu",
+                kernel_initializer=seeded_initialiser("he_uniform", seed + number),
             )
         )
-    layers.append(keras.layers.Conv1D(telemetry.shape[2], _WIDTH, padding="same", kernel_initializer="zeros"))
+    layers.append(
+        keras.layers.Conv1D(telemetry.shape[2], _WIDTH, padding="same", kernel_initializer="zeros")
+    )
     network = keras.Sequential(layers)
     network.compile(keras.optimizers.Adam(1e-3), "mse")
     network.fit((coarse - mean) / deviation, left / unit, batch_size=32, epochs=_EPOCHS, verbose=0)
-    return lambda windows: ridge.predict(windows) + unit * network.predict_on_batch((windows - mean) / deviation)
+    return lambda windows: (
+        ridge.predict(windows) + unit * network.predict_on_batch((windows - mean) / deviation)
+    )

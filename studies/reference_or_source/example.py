@@ -48,11 +48,24 @@ def tables(seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> dict[str, pd.Dat
         samples = np.arange(len(commands))
         times = samples // aircraft.unit_samples * _PERIOD_S + samples % aircraft.unit_samples
         for name, columns, digits, values in (
-            ("telemetry" if fault is None else "telemetry_fault", aircraft.channels, _TELEMETRY_DIGITS, telemetry),
-            ("simulator" if fault is None else "simulator_planned", aircraft.coarse_columns, _SIMULATOR_DIGITS, simulator),
+            (
+                "telemetry" if fault is None else "telemetry_fault",
+                aircraft.channels,
+                _TELEMETRY_DIGITS,
+                telemetry,
+            ),
+            (
+                "simulator" if fault is None else "simulator_planned",
+                aircraft.coarse_columns,
+                _SIMULATOR_DIGITS,
+                simulator,
+            ),
         ):
             cells = zip(columns, digits, values.T, strict=True)
-            table = {column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)] for column, places, series in cells}
+            table = {
+                column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)]
+                for column, places, series in cells
+            }
             found[name] = pd.DataFrame({"time": times} | table)
     return found
 

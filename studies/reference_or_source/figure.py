@@ -15,11 +15,19 @@ from studies.reference_or_source.uses import COARSE_REFERENCE, NO_SIMULATOR, REF
 
 SHOWN: dict[str, tuple[str, dict[str, Any]]] = {
     REFERENCE: ("enhanced run as reference", {"color": ENHANCED, "linestyle": "-", "marker": "s"}),
-    COARSE_REFERENCE: ("coarse run as reference", {"color": QUIET, "linestyle": ":", "marker": "D"}),
+    COARSE_REFERENCE: (
+        "coarse run as reference",
+        {"color": QUIET, "linestyle": ":", "marker": "D"},
+    ),
     SOURCE: ("source of training data", {"color": GENERATED, "linestyle": "--", "marker": "o"}),
     NO_SIMULATOR: ("no simulator", {"color": REAL, "linestyle": "-", "marker": "^"}),
 }
-_COMMANDS = {"": "known", "delayed, aligned": "late,\naligned", "delayed, ignored": "late,\nignored", "unknown": "unknown"}
+_COMMANDS = {
+    "": "known",
+    "delayed, aligned": "late,\naligned",
+    "delayed, ignored": "late,\nignored",
+    "unknown": "unknown",
+}
 _SIMULATORS = {
     "own": "same\nmodel",
     "off 10 %": "10 %\noff",
@@ -43,30 +51,62 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         "Bars: 95 % intervals over seeds and faults, at one point.",
     )
     grid = panels(figure, down + 0.45, len(systems), 3, gap=(0.62, 0.12), sharey=True)
-    for row, (name, about) in zip(np.reshape(grid, (len(systems), 3)), systems.items(), strict=True):
+    for row, (name, about) in zip(
+        np.reshape(grid, (len(systems), 3)), systems.items(), strict=True
+    ):
         points = about["points"]
         main = [point for point in points if point["axis"] == MAIN]
         middle = next(point["units"] for point in points if point["axis"] != MAIN)
-        crude = sorted((point for point in main if point["simulator"] == CRUDE), key=lambda each: each["units"])
-        by_simulator = [point for each in _SIMULATORS for point in main if point["units"] == middle and point["simulator"] == each]
+        crude = sorted(
+            (point for point in main if point["simulator"] == CRUDE), key=lambda each: each["units"]
+        )
+        by_simulator = [
+            point
+            for each in _SIMULATORS
+            for point in main
+            if point["units"] == middle and point["simulator"] == each
+        ]
         here = [point for point in crude if point["units"] == middle]
         commands = sorted(
-            [*here, *(point for point in points if point["axis"] == "commands")], key=lambda each: list(_COMMANDS).index(each["level"])
+            [*here, *(point for point in points if point["axis"] == "commands")],
+            key=lambda each: list(_COMMANDS).index(each["level"]),
         )
         for use, (label, style) in SHOWN.items():
             _curve(row[0], np.array([point["units"] for point in crude]), crude, use, label, style)
             for axes, there in ((row[1], by_simulator), (row[2], commands)):
-                _curve(axes, np.arange(len(there)), here * len(there) if use == NO_SIMULATOR else there, use, label, style)
+                _curve(
+                    axes,
+                    np.arange(len(there)),
+                    here * len(there) if use == NO_SIMULATOR else there,
+                    use,
+                    label,
+                    style,
+                )
         for place, (use, (_, style)) in enumerate(SHOWN.items()):
             recall = here[0]["uses"][use]["recall"]
             at = middle * 1.1 ** (place - 1.5)
-            row[0].plot([at, at], [100 * recall["low"], 100 * recall["high"]], color=style["color"], linewidth=1.2, alpha=0.6)
+            row[0].plot(
+                [at, at],
+                [100 * recall["low"], 100 * recall["high"]],
+                color=style["color"],
+                linewidth=1.2,
+                alpha=0.6,
+            )
         row[0].set_xscale("log")
         windows = 5 if name == "battery" else 10  # of an orbit, of a flight
-        row[0].set_xticks([point["units"] for point in crude], [f"{windows * point['units']:,}" for point in crude])
+        row[0].set_xticks(
+            [point["units"] for point in crude],
+            [f"{windows * point['units']:,}" for point in crude],
+        )
         row[0].minorticks_off()
-        row[1].set_xticks(np.arange(len(by_simulator)), [_SIMULATORS[point["simulator"]] for point in by_simulator], fontsize=6)
-        row[2].set_xticks(np.arange(len(commands)), [_COMMANDS[point["level"]] for point in commands], fontsize=6)
+        row[1].set_xticks(
+            np.arange(len(by_simulator)),
+            [_SIMULATORS[point["simulator"]] for point in by_simulator],
+            fontsize=6,
+        )
+        row[2].set_xticks(
+            np.arange(len(commands)), [_COMMANDS[point["level"]] for point in commands], fontsize=6
+        )
         for axes, there in ((row[1], by_simulator), (row[2], commands)):
             axes.set_xlim(-0.45, len(there) - 0.55)
         row[0].set_xlim(crude[0]["units"] / 1.4, crude[-1]["units"] * 1.4)
@@ -76,17 +116,40 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
             axes.set_xlabel(label)
     handles, labels = np.ravel(grid)[0].get_legend_handles_labels()
     above = 1 - down / figure.get_size_inches()[1]
-    figure.legend(handles, labels, frameon=False, ncols=4, loc="upper center", bbox_to_anchor=(0.5, above), handlelength=2.4)
+    figure.legend(
+        handles,
+        labels,
+        frameon=False,
+        ncols=4,
+        loc="upper center",
+        bbox_to_anchor=(0.5, above),
+        handlelength=2.4,
+    )
     return figure
 
 
-def _curve(axes: matplotlib.axes.Axes, at: np.ndarray, points: list, use: str, label: str, style: Mapping[str, Any]) -> None:
+def _curve(
+    axes: matplotlib.axes.Axes,
+    at: np.ndarray,
+    points: list,
+    use: str,
+    label: str,
+    style: Mapping[str, Any],
+) -> None:
     """Draws the recall of a use, with open marks where false alarms are too many."""
     uses = [point["uses"][use] for point in points]
     found = np.array([100 * each["recall"]["mean"] for each in uses])
     is_broken = np.array([each["false_alarms"]["mean"] > _BROKEN for each in uses])
     axes.plot(at, found, linewidth=1.2, markersize=3.5, label=label, **style)
-    axes.plot(at[is_broken], found[is_broken], style["marker"], color=style["color"], markerfacecolor="white", markersize=3.5, zorder=3)
+    axes.plot(
+        at[is_broken],
+        found[is_broken],
+        style["marker"],
+        color=style["color"],
+        markerfacecolor="white",
+        markersize=3.5,
+        zorder=3,
+    )
 
 
 FIGURES = {

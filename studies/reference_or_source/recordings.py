@@ -18,7 +18,9 @@ COMMANDS = "commands only"
 _PARTS = ("fit", "test", "source")
 
 
-def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, progress: Progress = SILENT) -> None:
+def record(
+    system: Any, counts: Mapping[str, int], seed: int, folder: Path, progress: Progress = SILENT
+) -> None:
     """Simulates all runs of a seed and writes them to `runs.npz`.
 
     Args:
@@ -30,15 +32,29 @@ def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, prog
         progress: Reports the progress.
     """
     arrays: dict[str, np.ndarray] = {}
-    commands = {part: _commands(system, counts[part], seed, number) for number, part in enumerate(_PARTS)}
+    commands = {
+        part: _commands(system, counts[part], seed, number) for number, part in enumerate(_PARTS)
+    }
     kinds = list(dict.fromkeys(fault.kind for fault in system.faults))
     told = progress.loop("runs", 1 + len(system.simulators))
     for number, part in enumerate(("fit", "test")):
-        (arrays[f"{part}/real"],) = system.run_real(commands[part], rng=np.random.default_rng([seed, 60, number]))
-    faulty = {kind: (_commands(system, counts["fault"], seed, 10 + number), _of_kind(system, kind)) for number, kind in enumerate(kinds)}
-    simulated = {kind: (_commands(system, counts["fault"], seed, 30 + number), _of_kind(system, kind)) for number, kind in enumerate(kinds)}
+        (arrays[f"{part}/real"],) = system.run_real(
+            commands[part], rng=np.random.default_rng([seed, 60, number])
+        )
+    faulty = {
+        kind: (_commands(system, counts["fault"], seed, 10 + number), _of_kind(system, kind))
+        for number, kind in enumerate(kinds)
+    }
+    simulated = {
+        kind: (_commands(system, counts["fault"], seed, 30 + number), _of_kind(system, kind))
+        for number, kind in enumerate(kinds)
+    }
     for number, (given, faults) in enumerate(faulty.values()):
-        for fault, run in zip(faults, system.run_real(given, faults, np.random.default_rng([seed, 61, number])), strict=True):
+        for fault, run in zip(
+            faults,
+            system.run_real(given, faults, np.random.default_rng([seed, 61, number])),
+            strict=True,
+        ):
             arrays[f"{key_of(fault)}/real"] = run
     told(1)
     # commands are drawn unit by unit, so that the first ones are those of `fit`
@@ -48,7 +64,9 @@ def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, prog
     for number, simulator in enumerate((*system.simulators, FITTED), 1):
         name, given_values = (CRUDE, values) if simulator == FITTED else (simulator, None)
         for part in _PARTS:
-            arrays[f"{part}/{simulator}"] = system.run_coarse(name, commands[part], values=given_values)[0]
+            arrays[f"{part}/{simulator}"] = system.run_coarse(
+                name, commands[part], values=given_values
+            )[0]
         for kind in kinds:
             planned = system.run_coarse(name, faulty[kind][0], values=given_values)[0]
             given, faults = simulated[kind]
@@ -77,7 +95,9 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
     scale, number = telemetry.std(axis=0), telemetry.shape[1]
 
     def values(moved: np.ndarray) -> np.ndarray:
-        return system.first_values + (moved - 1) * system.steps  # from 1, since the steps of the derivative are relative
+        return (
+            system.first_values + (moved - 1) * system.steps
+        )  # from 1, since the steps of the derivative are relative
 
     def errors(moved: np.ndarray) -> np.ndarray:
         run = system.run_coarse(CRUDE, commands, values=values(moved))[0]
@@ -85,7 +105,11 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
         return (apart - apart.mean(axis=0)).ravel()  # detectors do not mind an offset either
 
     bounds = 1 + np.asarray(system.bounds[0]), 1 + np.asarray(system.bounds[1])
-    return values(least_squares(errors, np.ones(len(system.parameters)), diff_step=0.1, max_nfev=15, bounds=bounds).x)
+    return values(
+        least_squares(
+            errors, np.ones(len(system.parameters)), diff_step=0.1, max_nfev=15, bounds=bounds
+        ).x
+    )
 
 
 def _commands(system: Any, number: int, seed: int, stream: int) -> np.ndarray:

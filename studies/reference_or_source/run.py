@@ -34,8 +34,12 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
     def tables_of(name: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
         return {"alarms": table_of(settings, stages, name, seed)}
 
-    versions = {_CLASSES[name][1]: importlib.metadata.version(_CLASSES[name][1]) for name in systems}
-    return run_study("reference_or_source", tables_of, systems, options, settings, out, {"versions": versions})
+    versions = {
+        _CLASSES[name][1]: importlib.metadata.version(_CLASSES[name][1]) for name in systems
+    }
+    return run_study(
+        "reference_or_source", tables_of, systems, options, settings, out, {"versions": versions}
+    )
 
 
 def table_of(settings: Settings, stages: Stages, name: str, seed: int) -> "pd.DataFrame":
@@ -53,7 +57,11 @@ def table_of(settings: Settings, stages: Stages, name: str, seed: int) -> "pd.Da
     chosen, system = settings.reference_or_source, kind()
     inside = system.unit_samples // system.window
     known = [max(1, number // inside) for number in chosen.known_windows]
-    numbers = {"fit": max(chosen.known_windows), "test": chosen.test_windows, "source": chosen.source_windows}
+    numbers = {
+        "fit": max(chosen.known_windows),
+        "test": chosen.test_windows,
+        "source": chosen.source_windows,
+    }
     numbers |= {"parameters": chosen.parameter_windows, "fault": chosen.fault_windows}
     counts = {part: max(1, number // inside) for part, number in numbers.items()}
     version = importlib.metadata.version(package)
@@ -72,8 +80,19 @@ def table_of(settings: Settings, stages: Stages, name: str, seed: int) -> "pd.Da
             if not arrays:
                 arrays.update(load_arrays(runs, "runs"))
             same = alone.setdefault(repr((point.units, point.windows)), {})
-            pd.DataFrame(rows_of(system, arrays, point, seed, same)).to_parquet(folder / "rows.parquet")
+            pd.DataFrame(rows_of(system, arrays, point, seed, same)).to_parquet(
+                folder / "rows.parquet"
+            )
 
-        about = f"{name} {seed}, {point.axis} {point.level} {point.simulator} {point.units}".replace("  ", " ")
-        found.append(pd.read_parquet(stages.run(about, judge, (repr(point), seed, _VERSION), [simulated]) / "rows.parquet"))
+        about = (
+            f"{name} {seed}, {point.axis} {point.level} {point.simulator} {point.units}".replace(
+                "  ", " "
+            )
+        )
+        found.append(
+            pd.read_parquet(
+                stages.run(about, judge, (repr(point), seed, _VERSION), [simulated])
+                / "rows.parquet"
+            )
+        )
     return pd.concat(found, ignore_index=True).assign(system=name, seed=seed)

@@ -20,7 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from studies.reference_or_source.detectors import CLASSIFIERS, ONE_CLASS, ONE_LINERS, across_folds, classifier
+from studies.reference_or_source.detectors import (
+    CLASSIFIERS,
+    ONE_CLASS,
+    ONE_LINERS,
+    across_folds,
+    classifier,
+)
 from studies.reference_or_source.enhancers import Map, fit_map
 from studies.reference_or_source.windows import Judged, by_fold
 
@@ -72,13 +78,22 @@ class Cell:
         alone: dict[str, Scores] | None = None,
     ):
         self.alone = {} if alone is None else alone
-        self.windows, self.seed, self.enhancer, self.draws, self.is_unknown = windows, seed, enhancer, draws, is_unknown
+        self.windows, self.seed, self.enhancer, self.draws, self.is_unknown = (
+            windows,
+            seed,
+            enhancer,
+            draws,
+            is_unknown,
+        )
         known = windows.known
         self._maps: dict[bytes, Map] = {}
         self._nominal: dict[bytes, np.ndarray] = {}
         self.planned = self._nearest(known.telemetry) if is_unknown else known.coarse
         self.residuals = by_fold(
-            known.folds, lambda learnt, held_out: self._less(known.telemetry[held_out], self.planned[held_out], self._learnt(learnt))
+            known.folds,
+            lambda learnt, held_out: self._less(
+                known.telemetry[held_out], self.planned[held_out], self._learnt(learnt)
+            ),
         )
 
     @property
@@ -92,7 +107,12 @@ class Cell:
         if key not in self._maps:
             some = slice(None) if rows is None else rows
             self._maps[key] = fit_map(
-                self.enhancer, self.planned[some], known.telemetry[some], known.starts[some], known.folds[some], self.seed
+                self.enhancer,
+                self.planned[some],
+                known.telemetry[some],
+                known.starts[some],
+                known.folds[some],
+                self.seed,
             )
         return self._maps[key]
 
@@ -109,7 +129,9 @@ class Cell:
         known, library = self.windows.known.telemetry, source[:, :, :number]
         spread = library.std(axis=(0, 1))
         library = (library - library.mean(axis=(0, 1))) / np.where(spread > 1e-6, spread, np.inf)
-        return source[_nearest_rows(library, (telemetry - known.mean(axis=(0, 1))) / known.std(axis=(0, 1)))]
+        return source[
+            _nearest_rows(library, (telemetry - known.mean(axis=(0, 1))) / known.std(axis=(0, 1)))
+        ]
 
     def _less(self, telemetry: np.ndarray, planned: np.ndarray, enhance: Map) -> np.ndarray:
         if not self.is_unknown:
@@ -125,12 +147,25 @@ class Cell:
 
     def noise(self, number: int, stream: int, rows: np.ndarray | None = None) -> np.ndarray:
         """Draws residual windows of some known windows (None: all) in one of several random streams; `(number, samples, channels)`."""
-        rng, residuals = np.random.default_rng([self.seed, 200, stream]), self.residuals if rows is None else self.residuals[rows]
+        rng, residuals = (
+            np.random.default_rng([self.seed, 200, stream]),
+            self.residuals if rows is None else self.residuals[rows],
+        )
         channels = residuals.shape[2]
         if self.draws == "separate":
-            return np.stack([residuals[rng.integers(0, len(residuals), number), :, each] for each in range(channels)], axis=2)
+            return np.stack(
+                [
+                    residuals[rng.integers(0, len(residuals), number), :, each]
+                    for each in range(channels)
+                ],
+                axis=2,
+            )
         drawn = residuals[rng.integers(0, len(residuals), number)]
-        return drawn * np.exp(rng.uniform(-np.log(2), np.log(2), (number, 1, channels))) if self.draws == "randomised" else drawn
+        return (
+            drawn * np.exp(rng.uniform(-np.log(2), np.log(2), (number, 1, channels)))
+            if self.draws == "randomised"
+            else drawn
+        )
 
     def scores(self, uses: tuple[str, ...] = USES) -> Iterator[Scores]:
         """Scores of every detector in every use that is tried."""
@@ -140,14 +175,22 @@ class Cell:
             REFERENCE: lambda: (self.residuals, self.differences),
             COARSE_REFERENCE: lambda: (
                 known.telemetry - self._as_channels(self.planned),
-                tested.telemetry - self._as_channels(self._nearest(tested.telemetry) if self.is_unknown else tested.coarse),
+                tested.telemetry
+                - self._as_channels(
+                    self._nearest(tested.telemetry) if self.is_unknown else tested.coarse
+                ),
             ),
             NO_SIMULATOR: lambda: (known.telemetry, tested.telemetry),
         }
-        for use in (use for use in signals if use in uses or (BOTH in uses and use == NO_SIMULATOR)):
+        for use in (
+            use for use in signals if use in uses or (BOTH in uses and use == NO_SIMULATOR)
+        ):
             learnt, judged = signals[use]()
             detectors = ONE_CLASS | (ONE_LINERS if use == NO_SIMULATOR and use in uses else {})
-            alone[use] = {name: self._one_class(use, name, make, learnt, judged) for name, make in detectors.items()}
+            alone[use] = {
+                name: self._one_class(use, name, make, learnt, judged)
+                for name, make in detectors.items()
+            }
             yield from alone[use].values() if use in uses else ()
         if BOTH in uses:
             for name in ONE_CLASS:
@@ -156,9 +199,14 @@ class Cell:
         if SOURCE in uses:
             for name, make in ONE_CLASS.items():
                 scores = by_fold(
-                    known.folds, lambda rows, held_out, make=make: self._learn_generated(make, rows).score(known.telemetry[held_out])
+                    known.folds,
+                    lambda rows, held_out, make=make: self._learn_generated(make, rows).score(
+                        known.telemetry[held_out]
+                    ),
                 )
-                yield Scores(SOURCE, name, scores, self._learn_generated(make).score(tested.telemetry))
+                yield Scores(
+                    SOURCE, name, scores, self._learn_generated(make).score(tested.telemetry)
+                )
         if self.windows.simulated and {SOURCE_FAULTS, REFERENCE_FAULTS} & set(uses):
             yield from self.classified(tuple(self.windows.simulated), uses)
 
@@ -168,7 +216,9 @@ class Cell:
         Known windows are scored by classifiers whose enhancer and noise come from other folds.
         """
         known, tested = self.windows.known, self.windows.tested
-        some = [tuple(_spread(each) for each in self.windows.simulated[number]) for number in faults]
+        some = [
+            tuple(_spread(each) for each in self.windows.simulated[number]) for number in faults
+        ]
         broken, expected = (np.concatenate(each) for each in zip(*some, strict=True))
 
         def train(use: str, name: str, rows: np.ndarray | None = None) -> Map:
@@ -176,15 +226,24 @@ class Cell:
             nominal, faulty = self._enhanced_source(rows), enhance(broken)
             if use == REFERENCE_FAULTS:
                 nominal, faulty = np.zeros_like(nominal), faulty - enhance(expected)
-            drawn = [each + self.noise(len(each), stream, rows) for stream, each in enumerate((nominal, faulty), 2)]
+            drawn = [
+                each + self.noise(len(each), stream, rows)
+                for stream, each in enumerate((nominal, faulty), 2)
+            ]
             return classifier(name, *drawn, self.seed)
 
-        signals = {SOURCE_FAULTS: (known.telemetry, tested.telemetry), REFERENCE_FAULTS: (self.residuals, self.differences)}
+        signals = {
+            SOURCE_FAULTS: (known.telemetry, tested.telemetry),
+            REFERENCE_FAULTS: (self.residuals, self.differences),
+        }
         for use in (use for use in signals if use in uses):
             learnt, judged = signals[use]
             for name in CLASSIFIERS:
                 make = functools.partial(train, use, name)
-                scores = by_fold(known.folds, lambda rows, held_out, make=make, learnt=learnt: make(rows)(learnt[held_out]))
+                scores = by_fold(
+                    known.folds,
+                    lambda rows, held_out, make=make, learnt=learnt: make(rows)(learnt[held_out]),
+                )
                 yield Scores(use, name, scores, make()(judged))
 
     def _learn_generated(self, make: Callable[[int], Any], rows: np.ndarray | None = None) -> Any:
@@ -192,7 +251,14 @@ class Cell:
         generated = self._enhanced_source(rows)
         return make(self.seed).fit(generated + self.noise(len(generated), 1, rows))
 
-    def _one_class(self, use: str, name: str, make: Callable[[int], Any], learnt: np.ndarray, judged: np.ndarray) -> Scores:
+    def _one_class(
+        self,
+        use: str,
+        name: str,
+        make: Callable[[int], Any],
+        learnt: np.ndarray,
+        judged: np.ndarray,
+    ) -> Scores:
         if use == NO_SIMULATOR and name in self.alone:
             return self.alone[name]
         fitted, known = across_folds(make, learnt, self.windows.known.folds, self.seed)
@@ -217,7 +283,12 @@ def _nearest_rows(library: np.ndarray, windows: np.ndarray) -> np.ndarray:
     """The row of the library that is nearest to each window, by Euclidean distance."""
     table, wanted = (each.reshape(len(each), -1).astype(np.float32) for each in (library, windows))
     squares = np.sum(table**2, axis=1)
-    return np.concatenate([np.argmin(squares - 2 * part @ table.T, axis=1) for part in np.array_split(wanted, max(1, len(wanted) // 500))])
+    return np.concatenate(
+        [
+            np.argmin(squares - 2 * part @ table.T, axis=1)
+            for part in np.array_split(wanted, max(1, len(wanted) // 500))
+        ]
+    )
 
 
 def _spread(windows: np.ndarray) -> np.ndarray:

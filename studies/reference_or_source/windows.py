@@ -37,14 +37,18 @@ class Windows:
         return self.units % NUM_FOLDS
 
 
-def unit_starts(system: Any, num_units: int, stride: int, first: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def unit_starts(
+    system: Any, num_units: int, stride: int, first: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
     """First samples and units of windows, a stride apart, that lie within one unit each, behind its `first` sample."""
     inside = np.arange(first, system.unit_samples - system.window + 1, stride)
     starts = (np.arange(num_units)[:, None] * system.unit_samples + inside).ravel()
     return starts, starts // system.unit_samples
 
 
-def by_fold(folds: np.ndarray, predict: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+def by_fold(
+    folds: np.ndarray, predict: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> np.ndarray:
     """Predicts the windows of each fold from those of the others.
 
     Args:
@@ -71,7 +75,9 @@ def delayed(coarse: np.ndarray, unit_samples: int, delays: np.ndarray) -> np.nda
     return np.take_along_axis(units, places[:, :, None], axis=1).reshape(coarse.shape)
 
 
-def estimated_delays(coarse: np.ndarray, telemetry: np.ndarray, unit_samples: int, most: int) -> np.ndarray:
+def estimated_delays(
+    coarse: np.ndarray, telemetry: np.ndarray, unit_samples: int, most: int
+) -> np.ndarray:
     """Finds for each unit the delay that takes a coarse run to the telemetry, by the correlation of the channels with their coarse columns.
 
     Args:
@@ -87,9 +93,13 @@ def estimated_delays(coarse: np.ndarray, telemetry: np.ndarray, unit_samples: in
     tried = np.arange(-most, most + 1)
     sums = []
     for delay in tried:
-        moved = delayed(coarse[:, :number], unit_samples, np.full(len(there), delay)).reshape(there.shape)
+        moved = delayed(coarse[:, :number], unit_samples, np.full(len(there), delay)).reshape(
+            there.shape
+        )
         moved = moved - moved.mean(axis=1, keepdims=True)
-        products = (moved * centred).sum(axis=1) / (norms * (np.sqrt((moved**2).sum(axis=1)) + 1e-9))
+        products = (moved * centred).sum(axis=1) / (
+            norms * (np.sqrt((moved**2).sum(axis=1)) + 1e-9)
+        )
         sums.append(products.sum(axis=1))
     return tried[np.argmax(sums, axis=0)]
 
@@ -143,29 +153,43 @@ def windows_of(
     scale = None
 
     def planned(part: str) -> np.ndarray:
-        return runs[f"{part}/{CRUDE}"][:, len(system.channels) :] if simulator == COMMANDS else runs[f"{part}/{simulator}"]
+        return (
+            runs[f"{part}/{CRUDE}"][:, len(system.channels) :]
+            if simulator == COMMANDS
+            else runs[f"{part}/{simulator}"]
+        )
 
     def pair(part: str, stream: int, units: int | None = None) -> tuple[np.ndarray, np.ndarray]:
         real, coarse = runs[f"{part}/real"], planned(part)
-        real, coarse = (each if units is None else each[: units * samples] for each in (real, coarse))
+        real, coarse = (
+            each if units is None else each[: units * samples] for each in (real, coarse)
+        )
         telemetry = system.measure(real, np.random.default_rng([seed, 100, stream]), noise)
         if delay != "none":
-            delays = np.random.default_rng([seed, 101, stream]).integers(-most, most + 1, len(coarse) // samples)
+            delays = np.random.default_rng([seed, 101, stream]).integers(
+                -most, most + 1, len(coarse) // samples
+            )
             coarse = delayed(coarse, samples, delays)
             if delay == "aligned":
-                coarse = delayed(coarse, samples, estimated_delays(coarse, telemetry, samples, most))
+                coarse = delayed(
+                    coarse, samples, estimated_delays(coarse, telemetry, samples, most)
+                )
         return telemetry / scale if scale is not None else telemetry, coarse
 
     def windows(telemetry: np.ndarray, coarse: np.ndarray, stride: int, first: int = 0) -> Windows:
         starts, units = unit_starts(system, len(telemetry) // samples, stride, first)
-        return Windows(cut([telemetry], starts, window), cut([coarse], starts, window), starts, units)
+        return Windows(
+            cut([telemetry], starts, window), cut([coarse], starts, window), starts, units
+        )
 
     telemetry, coarse = pair("fit", 0, num_units)
     scale = telemetry.std(axis=0)
     known = windows(telemetry / scale, coarse, window // 4)
     if len(known.starts) > MOST_KNOWN:
         some = np.linspace(0, len(known.starts) - 1, MOST_KNOWN).astype(int)
-        known = Windows(*(getattr(known, field.name)[some] for field in dataclasses.fields(Windows)))
+        known = Windows(
+            *(getattr(known, field.name)[some] for field in dataclasses.fields(Windows))
+        )
     parts = [windows(*pair("test", 1), window // 2)]
     labels = [np.full(len(parts[0].starts), -1)]
     simulated = {}
@@ -175,16 +199,32 @@ def windows_of(
         if f"{key_of(fault)}/{simulator}/simulated" in runs:
             faulty = runs[f"{key_of(fault)}/{simulator}/simulated"]
             starts, _ = unit_starts(system, len(faulty) // samples, window // 2, system.onset)
-            simulated[number] = tuple(cut([run], starts, window) for run in (faulty, runs[f"{fault.kind}/{simulator}/nominal"]))
+            simulated[number] = tuple(
+                cut([run], starts, window)
+                for run in (faulty, runs[f"{fault.kind}/{simulator}/nominal"])
+            )
     faults = [(fault.kind, fault.severity) for fault in system.faults]
     for kind in RELATIONS if with_relations else ():
         parts.append(_unrelated(parts[0], kind, np.random.default_rng([seed, 102])))
         labels.append(np.full(len(parts[-1].starts), len(faults)))
         faults.append((kind, 1.0))
-    tested = Windows(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in dataclasses.fields(Windows)))
+    tested = Windows(
+        *(
+            np.concatenate([getattr(part, field.name) for part in parts])
+            for field in dataclasses.fields(Windows)
+        )
+    )
     source = planned("source")
     starts, _ = unit_starts(system, len(source) // samples, window // 2)
-    return Judged(known, tested, np.concatenate(labels), tuple(faults), cut([source], starts, window), scale, simulated)
+    return Judged(
+        known,
+        tested,
+        np.concatenate(labels),
+        tuple(faults),
+        cut([source], starts, window),
+        scale,
+        simulated,
+    )
 
 
 def _unrelated(nominal: Windows, kind: str, rng: np.random.Generator) -> Windows:

@@ -19,7 +19,9 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
 
     def tables_of(environment: str, seed: int, stages: Any) -> dict[str, Any]:
         one = Replicate(settings.of(environment, seed), stages)
-        return one.tables | ({"degraded": DegradedModes(one).table} if environment == names[0] else {})
+        return one.tables | (
+            {"degraded": DegradedModes(one).table} if environment == names[0] else {}
+        )
 
     return run_study("robustness", tables_of, names, options, settings, out)
 

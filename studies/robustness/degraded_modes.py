@@ -53,7 +53,9 @@ class DegradedModes:
 
         _ = self.example.enhancer_folder
         depends = (self.settings.paper.of("windows"), self.settings.modes)
-        folder = self.stages.run("degraded modes", self._make, depends, ("telemetry", "enhancer"), version=2)
+        folder = self.stages.run(
+            "degraded modes", self._make, depends, ("telemetry", "enhancer"), version=2
+        )
         return pd.read_parquet(folder / "degraded.parquet")
 
     def _make(self, folder: Path) -> None:
@@ -65,7 +67,10 @@ class DegradedModes:
         for done, (mode, severity) in enumerate(TRIED, 1):
             coarse, truth = self._test_pairs(mode, severity)
             for method, estimate in methods.items():
-                error = float(np.sqrt(np.mean((estimate(coarse) - truth) ** 2, dtype=np.float64))) / unit
+                error = (
+                    float(np.sqrt(np.mean((estimate(coarse) - truth) ** 2, dtype=np.float64)))
+                    / unit
+                )
                 cells.append({"method": method, "mode": mode, "severity": severity, "nrmse": error})
             told(done)
         pd.DataFrame(cells).assign(seed=self.settings.seed).to_parquet(folder / "degraded.parquet")
@@ -74,16 +79,27 @@ class DegradedModes:
         scenario = None if mode == "nominal" else Degraded(mode, severity)
         return self._pairs(scenario, self.settings.modes.num_windows, f"test {mode} {severity}")
 
-    def _pairs(self, scenario: Degraded | None, num_windows: int, purpose: str) -> tuple[np.ndarray, np.ndarray]:
+    def _pairs(
+        self, scenario: Degraded | None, num_windows: int, purpose: str
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Coarse windows in a mode, and the true noiseless signal at the same times and with the same draws."""
         chosen, chance = self.settings.paper, int(self.example.draw(purpose).integers(2**31))
         begins = np.random.default_rng(chance).integers(0, 10**6, num_windows)
         times = chosen.interval * (begins[:, None] + np.arange(chosen.window, dtype=np.float64))
-        size, shortest = chosen.orbit_amplitude + chosen.rotation_amplitude, min(chosen.orbit_period, chosen.rotation_period)
+        size, shortest = (
+            chosen.orbit_amplitude + chosen.rotation_amplitude,
+            min(chosen.orbit_period, chosen.rotation_period),
+        )
         coarse = self.example.coarse.simulate(times, scenario, np.random.default_rng(chance + 1))
         if scenario is None:
             return coarse, self.example.truth(times).astype(np.float32)
-        how = scenario.mode, scenario.severity, (-size, size), shortest, np.random.default_rng(chance + 1)
+        how = (
+            scenario.mode,
+            scenario.severity,
+            (-size, size),
+            shortest,
+            np.random.default_rng(chance + 1),
+        )
         truth = degrade(self.example.truth, times, *how, scenario.first_sample(chosen.window))
         return coarse, truth.astype(np.float32)
 
@@ -104,10 +120,14 @@ class DegradedModes:
     def _methods(self) -> dict[str, Estimate]:
         nominal = self.example.windows("train", self.settings.paper.num_windows, "training windows")
         coarse, target = self._randomised_pairs()
-        starts = coarse.shape[1] * np.arange(len(coarse))  # windows of one configuration are neighbours, and stay in one block
+        starts = coarse.shape[1] * np.arange(
+            len(coarse)
+        )  # windows of one configuration are neighbours, and stay in one block
 
         def learnt_on_faults(name: str) -> Estimate:
-            enhancer = Training(coarse[:, :, None], target[:, :, None], starts).fit(name, self.settings.seed)
+            enhancer = Training(coarse[:, :, None], target[:, :, None], starts).fit(
+                name, self.settings.seed
+            )
             return lambda windows: enhancer.predict(windows[:, :, None])[:, :, 0]
 
         return {

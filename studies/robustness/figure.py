@@ -47,7 +47,15 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     )
     environments = found["environments"]
     columns = min(2, len(environments))
-    grid = panels(figure, down + 0.22, -(-len(environments) // columns), columns, gap=(0.42, 0.16), sharey=True, sharex=True)
+    grid = panels(
+        figure,
+        down + 0.22,
+        -(-len(environments) // columns),
+        columns,
+        gap=(0.42, 0.16),
+        sharey=True,
+        sharex=True,
+    )
     left = 1.95 / DOUBLE
     width = (1 - left - 0.04) / columns
     for number, (axes, name) in enumerate(zip(grid.ravel(), environments, strict=False)):
@@ -98,12 +106,20 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     for axes, mode in zip(grid.ravel(), modes, strict=True):
         axes.axvspan(0, LARGEST_TRAINED, color=GREY_TINT, zorder=0)
         for method, (colour, style, _) in _METHODS.items():
-            axes.plot(*np.transpose(curves[method]["nominal"] + curves[method][mode]), style, color=colour)
+            axes.plot(
+                *np.transpose(curves[method]["nominal"] + curves[method][mode]), style, color=colour
+            )
         axes.set_title(mode.replace("_", " "))
         axes.set_ylim(0, None)
         axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     last = modes[2]
-    label_ends(grid[0, -1], {label: ([curves[method][last][-1][1]], colour) for method, (colour, _, label) in _METHODS.items()})
+    label_ends(
+        grid[0, -1],
+        {
+            label: ([curves[method][last][-1][1]], colour)
+            for method, (colour, _, label) in _METHODS.items()
+        },
+    )
     for axes in grid[-1]:
         axes.set_xlabel("severity")
     for axes in grid[:, 0]:

@@ -56,7 +56,9 @@ class Replicate:
         # the number of replicates does not affect a replicate
         which = dataclasses.replace(self.settings.robustness, num_seeds=0, first_seed=0)
         depends = (self.settings.paper.of("windows"), which)
-        folder = self.stages.run("arms", self._make_arms, depends, ("telemetry", "enhancer", "noise GAN"), version=2)
+        folder = self.stages.run(
+            "arms", self._make_arms, depends, ("telemetry", "enhancer", "noise GAN"), version=2
+        )
         return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
 
     def _make_arms(self, folder: Path) -> None:
@@ -74,7 +76,9 @@ class Replicate:
             told(done)
         for name, each in rows.items():
             table = pd.DataFrame(each, columns=TABLES[name])
-            table.assign(environment=self.settings.noise, seed=seed).to_parquet(folder / f"{name}.parquet")
+            table.assign(environment=self.settings.noise, seed=seed).to_parquet(
+                folder / f"{name}.parquet"
+            )
 
     def trial(self, num_anomalous: int | None = None) -> evaluation.Trial:
         """The test data: held-out nominal windows, and the same windows with anomalies.
@@ -83,7 +87,9 @@ class Replicate:
             num_anomalous: Anomalous windows of each kind and severity; None for the number in the settings.
         """
         chosen = self.settings.robustness
-        nominal, reference = (self.example.windows(part, None)["target"] for part in ("test", "calibration"))
+        nominal, reference = (
+            self.example.windows(part, None)["target"] for part in ("test", "calibration")
+        )
         return evaluation.make_trial(
             nominal,
             reference,
@@ -117,6 +123,9 @@ class Replicate:
     def _without_network(self) -> tuple[Ridge, WindowBootstrap]:
         """Ridge regression on the windows from which the paper's enhancer learns, and as many windows of what it leaves."""
         number = self.settings.paper.num_windows
-        learnt, others = (self.example.windows("train", number, each) for each in ("training windows", "residual windows"))
+        learnt, others = (
+            self.example.windows("train", number, each)
+            for each in ("training windows", "residual windows")
+        )
         ridge = fit_ridge(learnt["coarse"], learnt["target"], learnt["start"])
         return ridge, WindowBootstrap(others["target"] - ridge.predict(others["coarse"]))

@@ -57,7 +57,9 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
 
 def rates(alarms: "pd.DataFrame") -> "pd.DataFrame":
     """False-alarm rate of each environment, seed, arm and detector, over all blocks of time: column `rate`."""
-    counts = alarms.groupby([*REPLICATE, "arm", "detector"], as_index=False)[["alarms", "windows"]].sum()
+    counts = alarms.groupby([*REPLICATE, "arm", "detector"], as_index=False)[
+        ["alarms", "windows"]
+    ].sum()
     return counts.assign(rate=counts["alarms"] / counts["windows"])
 
 
@@ -75,27 +77,41 @@ def by_block(alarms: "pd.DataFrame") -> "pd.DataFrame":
     blocks = trained(alarms)
     groups = blocks.groupby([*REPLICATE, "arm", "detector"])["windows"]
     share = blocks["alarms"] * groups.transform("size") / groups.transform("sum")
-    return blocks.assign(share=share).groupby([*REPLICATE, "block", "arm"])["share"].mean().unstack("arm")
+    return (
+        blocks.assign(share=share)
+        .groupby([*REPLICATE, "block", "arm"])["share"]
+        .mean()
+        .unstack("arm")
+    )
 
 
-def arms(alarms: "pd.DataFrame", recall: "pd.DataFrame", environments: Sequence[str]) -> dict[str, Any]:
+def arms(
+    alarms: "pd.DataFrame", recall: "pd.DataFrame", environments: Sequence[str]
+) -> dict[str, Any]:
     """False alarms, recall and the criterion of claim C8 for each arm."""
     cells = [*REPLICATE, "arm", "detector"]
     rate = trained(rates(alarms)).set_index(cells)["rate"]
     found = trained(recall).groupby(cells)[["recall", "recall_at_real_rate"]].mean()
-    per_detector, recalls = (each.groupby(["arm", "environment", "detector"]).mean() for each in (rate, found))
+    per_detector, recalls = (
+        each.groupby(["arm", "environment", "detector"]).mean() for each in (rate, found)
+    )
     blocks = by_block(alarms)
     kept = keeps_the_rule(per_detector, recalls["recall"])
     return {
         arm: {
             "false_alarms": _share(mean_interval(blocks[arm])),
             **{name: float(recalls.loc[arm, name].mean()) for name in recalls},
-            "recalls_at_real_rate": recalls.loc[arm, "recall_at_real_rate"].groupby("detector").mean().to_dict(),
+            "recalls_at_real_rate": recalls.loc[arm, "recall_at_real_rate"]
+            .groupby("detector")
+            .mean()
+            .to_dict(),
             "criterion": {"met": int(kept[arm].sum()), "of": len(kept)},
             "by_environment": {
                 name: {
                     "false_alarms": _share(mean_interval(blocks[arm].xs(name), ["seed"])),
-                    "recall_at_real_rate": float(recalls.loc[(arm, name), "recall_at_real_rate"].mean()),
+                    "recall_at_real_rate": float(
+                        recalls.loc[(arm, name), "recall_at_real_rate"].mean()
+                    ),
                     "detectors": per_detector[arm, name].to_dict(),
                 }
                 for name in environments
@@ -124,7 +140,10 @@ def controls(alarms: "pd.DataFrame", recall: "pd.DataFrame") -> dict[str, Any]:
     """False alarms and recall of scores of one line of code, with thresholds set on real windows."""
     rate = rates(alarms).groupby("detector")["rate"].mean()
     found = recall.groupby("detector")[["recall", "recall_at_real_rate"]].mean()
-    return {name: {"false_alarms": float(rate[name]), **found.loc[name].astype(float).to_dict()} for name in CONTROLS}
+    return {
+        name: {"false_alarms": float(rate[name]), **found.loc[name].astype(float).to_dict()}
+        for name in CONTROLS
+    }
 
 
 def contrasts(alarms: "pd.DataFrame") -> list[dict[str, Any]]:
@@ -135,7 +154,10 @@ def contrasts(alarms: "pd.DataFrame") -> list[dict[str, Any]]:
             "first": first,
             "second": second,
             "difference": mean_interval(difference),
-            "by_environment": {name: mean_interval(difference.xs(name), ["seed"]) for name in difference.index.unique("environment")},
+            "by_environment": {
+                name: mean_interval(difference.xs(name), ["seed"])
+                for name in difference.index.unique("environment")
+            },
         }
         for first, second in CONTRASTS
         for difference in [blocks[first] - blocks[second]]
@@ -144,7 +166,11 @@ def contrasts(alarms: "pd.DataFrame") -> list[dict[str, Any]]:
 
 def modes(degraded: "pd.DataFrame") -> dict[str, Any]:
     """Error of each method on nominal windows, inside and outside the severities of training, and by mode and severity."""
-    where = np.select([degraded["mode"] == "nominal", degraded["severity"] <= LARGEST_TRAINED], ["nominal", "inside"], default="outside")
+    where = np.select(
+        [degraded["mode"] == "nominal", degraded["severity"] <= LARGEST_TRAINED],
+        ["nominal", "inside"],
+        default="outside",
+    )
     by_range = degraded.assign(where=where).groupby(["method", "where"])["nrmse"].mean()
     by_mode = degraded.groupby(["method", "mode", "severity"])["nrmse"].mean()
     return {
@@ -152,7 +178,10 @@ def modes(degraded: "pd.DataFrame") -> dict[str, Any]:
         "nrmse": {method: by_range[method].to_dict() for method in METHODS},
         "by_mode": {
             method: {
-                mode: [[round(float(severity), 4), float(value)] for severity, value in values.droplevel(0).items()]
+                mode: [
+                    [round(float(severity), 4), float(value)]
+                    for severity, value in values.droplevel(0).items()
+                ]
                 for mode, values in by_mode[method].groupby(level="mode")
             }
             for method in METHODS

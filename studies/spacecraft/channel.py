@@ -24,7 +24,9 @@ def stretches(channel: LabelledChannel) -> dict[str, Any]:
     from enhsim_tf.simulator.fitting import fit
     from enhsim_tf.simulator.options import FitOptions
 
-    simulator, _ = fit(channel.train, options=FitOptions(enhancer="ridge", noise="residual windows", held_out=0))
+    simulator, _ = fit(
+        channel.train, options=FitOptions(enhancer="ridge", noise="residual windows", held_out=0)
+    )
     ((begin, end),), window = channel.sequences, simulator.window
     found: dict[str, Any] = {"anomaly": (begin, end)}
     for name, series, first in (
@@ -47,10 +49,14 @@ def draw(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         f"Channel {CHANNEL} of the SMAP satellite, scaled by its publishers, and the enhanced square wave, aligned in clock, level and gain.",
     )
     grid = panels(figure, down + 0.22, 1, 3, gap=(0.2, 0.22), sharey=True)
-    for axes, (name, curves) in zip(grid[0], [each for each in found.items() if each[0] != "anomaly"], strict=True):
+    for axes, (name, curves) in zip(
+        grid[0], [each for each in found.items() if each[0] != "anomaly"], strict=True
+    ):
         samples, telemetry, enhanced = curves
         axes.plot(samples, telemetry, color=REAL, linewidth=0.7, label="telemetry")
-        axes.plot(samples, enhanced, color=ENHANCED, linestyle=DASHED, linewidth=1.2, label="enhanced")
+        axes.plot(
+            samples, enhanced, color=ENHANCED, linestyle=DASHED, linewidth=1.2, label="enhanced"
+        )
         axes.set_title(name)
         axes.set_xlabel("time (samples)")
     grid[0, 2].axvspan(*found["anomaly"], color=GREY_TINT, zorder=0)

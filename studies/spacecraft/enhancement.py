@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 
-def error_rows(simulator: "EnhancedSimulator", ridge: "EnhancedSimulator", channel: LabelledChannel) -> list[dict[str, Any]]:
+def error_rows(
+    simulator: "EnhancedSimulator", ridge: "EnhancedSimulator", channel: LabelledChannel
+) -> list[dict[str, Any]]:
     """Computes the errors of the square wave, `coarse`, and of both enhancers on nominal test windows that share no sample.
 
     The phase, offset and gain of each window are found with the waveform whose error is computed.
@@ -37,11 +39,21 @@ def error_rows(simulator: "EnhancedSimulator", ridge: "EnhancedSimulator", chann
         "enhanced": simulator.enhance(*_waves(simulator, True).align(targets)),
     }
     deviation = targets.std(axis=(1, 2), dtype=np.float64)
-    deviation = np.where(deviation > 0, deviation, np.nan)  # the quotient is undefined for constant targets
+    deviation = np.where(
+        deviation > 0, deviation, np.nan
+    )  # the quotient is undefined for constant targets
     rows = []
     for method, estimate in estimates.items():
-        errors = np.sqrt(np.mean((estimate - targets) ** 2, axis=(1, 2), dtype=np.float64)) / deviation
-        rows.append({"method": method, "nrmse": float(np.nanmedian(errors)), "windows": int(np.sum(~np.isnan(errors)))})
+        errors = (
+            np.sqrt(np.mean((estimate - targets) ** 2, axis=(1, 2), dtype=np.float64)) / deviation
+        )
+        rows.append(
+            {
+                "method": method,
+                "nrmse": float(np.nanmedian(errors)),
+                "windows": int(np.sum(~np.isnan(errors))),
+            }
+        )
     return rows
 
 

@@ -7,7 +7,18 @@ import matplotlib.figure
 import numpy as np
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, RIDGE, SINGLE, new_sheet, panels
+from enhsim_tf.common.plot_style import (
+    COARSE,
+    DOUBLE,
+    ENHANCED,
+    GENERATED,
+    QUIET,
+    REAL,
+    RIDGE,
+    SINGLE,
+    new_sheet,
+    panels,
+)
 
 Findings = Mapping[str, Any]
 GROUPS = {"references": (ENHANCED, "s"), "controls": (QUIET, "D"), "sources": (GENERATED, "o")}
@@ -26,7 +37,10 @@ def reference_or_source(found: Findings) -> matplotlib.figure.Figure:
     )
     grid = panels(figure, down + 0.1, 1, 2, sharey=True)
     left, width = 1.95 / DOUBLE, (1 - 2.1 / DOUBLE) / 2
-    values = (("auc_pr", 1, "AUC-PR of labelled samples"), ("false_alarms", 100, "false alarms at own threshold (%)"))
+    values = (
+        ("auc_pr", 1, "AUC-PR of labelled samples"),
+        ("false_alarms", 100, "false alarms at own threshold (%)"),
+    )
     for number, (axes, (key, unit, label)) in enumerate(zip(grid[0], values, strict=True)):
         place = axes.get_position()
         axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
@@ -34,11 +48,15 @@ def reference_or_source(found: Findings) -> matplotlib.figure.Figure:
             colour, mark = GROUPS[group]
             colour = REAL if name == "real" else colour
             each = {end: unit * value for end, value in found[group][name][key].items()}
-            axes.plot([each["low"], each["high"]], [-height] * 2, color=colour, linewidth=2.2, alpha=0.45)
+            axes.plot(
+                [each["low"], each["high"]], [-height] * 2, color=colour, linewidth=2.2, alpha=0.45
+            )
             axes.plot(each["mean"], -height, mark, color=colour, markersize=4.5)
         axes.set_xlabel(label)
         axes.set_xlim(-0.03 * unit, 1.03 * unit)
-    grid[0, 1].axvline(1, color=QUIET, linewidth=0.6, zorder=0)  # the rate that thresholds are set for
+    grid[0, 1].axvline(
+        1, color=QUIET, linewidth=0.6, zorder=0
+    )  # the rate that thresholds are set for
     grid[0, 0].set_yticks(-np.arange(len(names)), [name for _, name in names])
     grid[0, 1].tick_params(labelleft=False)
     return figure
@@ -54,14 +72,27 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
         "Spacecraft channels: median error of nominal test windows, aligned in phase, offset and gain.",
     )
     axes = panels(figure, down + 0.3, 1, 1)[0, 0]
-    marks = (("coarse", "s", COARSE, 0.0), ("enhanced", "o", ENHANCED, 0.12), ("ridge", "^", RIDGE, -0.12))
+    marks = (
+        ("coarse", "s", COARSE, 0.0),
+        ("enhanced", "o", ENHANCED, 0.12),
+        ("ridge", "^", RIDGE, -0.12),
+    )
     for method, mark, colour, beside in marks:
         values = [about["nrmse"][method] for about in channels.values()]
-        axes.plot(values, beside - np.arange(len(values)), mark, color=colour, markersize=5, label=method)
+        axes.plot(
+            values, beside - np.arange(len(values)), mark, color=colour, markersize=5, label=method
+        )
     axes.set_yticks(-np.arange(len(channels)), list(channels))
     axes.set_xlim(0, 1.08 * max(max(about["nrmse"].values()) for about in channels.values()))
     axes.set_xlabel("NRMSE (in standard deviations of the window)")
-    axes.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(-0.05, 1.0), handletextpad=0.2, columnspacing=1.0)
+    axes.legend(
+        frameon=False,
+        ncols=3,
+        loc="lower left",
+        bbox_to_anchor=(-0.05, 1.0),
+        handletextpad=0.2,
+        columnspacing=1.0,
+    )
     return figure
 
 

@@ -67,15 +67,22 @@ class Judge:
         by_sample = mean_over_windows(scores, self.begins, self.window, len(self.labels))
         return {
             "false_alarms": float(np.mean(nominal > metrics.finite_threshold(own, self.rate)[0])),
-            "false_alarms_past": float(np.mean(nominal > metrics.finite_threshold(past, self.rate)[0])),
-            **{f"found_at_{rate:g}": sum(bool((scores[each] > limit).any()) for each in self.meets) for rate, limit in limits.items()},
+            "false_alarms_past": float(
+                np.mean(nominal > metrics.finite_threshold(past, self.rate)[0])
+            ),
+            **{
+                f"found_at_{rate:g}": sum(bool((scores[each] > limit).any()) for each in self.meets)
+                for rate, limit in limits.items()
+            },
             "sequences": len(self.meets),
             "auc_pr": float(average_precision_score(self.labels, by_sample)),
             "vus_pr": vus_pr(self.labels, by_sample, round(self.period)),
         }
 
 
-def windows_that_meet(begins: np.ndarray, window: int, ranges: Sequence[tuple[int, int]]) -> np.ndarray:
+def windows_that_meet(
+    begins: np.ndarray, window: int, ranges: Sequence[tuple[int, int]]
+) -> np.ndarray:
     """Tells which windows share a sample with which half-open range, boolean of shape `(ranges, windows)`."""
     bounds = np.asarray(ranges, np.int64).reshape(-1, 2)
     return (begins < bounds[:, 1:]) & (begins + window > bounds[:, :1])

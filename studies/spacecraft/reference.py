@@ -27,7 +27,10 @@ _FLAT = 1e-6  # a window whose standard deviation is below this share of the lar
 
 
 def reference_rows(
-    judge: Judge, channel: LabelledChannel, simulators: "Mapping[str, EnhancedSimulator]", settings: Settings
+    judge: Judge,
+    channel: LabelledChannel,
+    simulators: "Mapping[str, EnhancedSimulator]",
+    settings: Settings,
 ) -> list[dict[str, Any]]:
     """Judges residual detectors, named as the simulators that were fitted to the train part of the channel, and left discord."""
     from enhsim_tf.simulator.options import ScoreOptions
@@ -41,9 +44,16 @@ def reference_rows(
 
     rows = []
     for name, simulator in simulators.items():
-        series = simulator.generate_series(number // 2 * window, seed=seed + 1)[:, 0]  # of 1,000 windows, as in the command `score`
-        scorer = Scorer(simulator, ScoreOptions(RESIDUAL, number, settings.spacecraft.false_alarm_rate, seed))
-        sizes = [scorer.score_windows(windows[:, :, None]) for windows in (judge.windows, windows_of(series), windows_of(train))]
+        series = simulator.generate_series(number // 2 * window, seed=seed + 1)[
+            :, 0
+        ]  # of 1,000 windows, as in the command `score`
+        scorer = Scorer(
+            simulator, ScoreOptions(RESIDUAL, number, settings.spacecraft.false_alarm_rate, seed)
+        )
+        sizes = [
+            scorer.score_windows(windows[:, :, None])
+            for windows in (judge.windows, windows_of(series), windows_of(train))
+        ]
         for ending, bound in BOUNDS.items():
             followed = [following_drift(each, scorer.typical_size, bound) for each in sizes]
             rows.append({"training": REFERENCE, "detector": name + ending} | judge.judge(*followed))
@@ -83,6 +93,8 @@ def left_discord(series: np.ndarray, begins: np.ndarray, window: int) -> np.ndar
             continue
         centred = (every[begin] - mean[begin]) / spread[begin]
         scale = np.where(is_flat[earlier], np.inf, spread[earlier])
-        correlation = every[earlier] @ centred / (window * scale)  # the centred window has mean 0, so the means of the others do not count
+        correlation = (
+            every[earlier] @ centred / (window * scale)
+        )  # the centred window has mean 0, so the means of the others do not count
         found[number] = np.sqrt(max(2 * window * (1 - correlation.max()), 0.0))
     return found

@@ -35,15 +35,23 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
         InputError: If the folder does not have this layout, a channel is missing, or no channel can be used.
     """
     labels = read_labels(options.data)
-    channels = list(labels) if options.channels is None else [name.strip() for name in options.channels.split(",")]
+    channels = (
+        list(labels)
+        if options.channels is None
+        else [name.strip() for name in options.channels.split(",")]
+    )
     unknown = [name for name in channels if name not in labels]
     if unknown:
-        raise InputError(f"Expected --channels of {', '.join(list(labels)[:8])}. Received: {unknown[0]!r}. Name labelled ones.")
+        raise InputError(
+            f"Expected --channels of {', '.join(list(labels)[:8])}. Received: {unknown[0]!r}. Name labelled ones."
+        )
     skipped: dict[str, str] = {}
 
     def tables_of(name: str, seed: int, stages: Stages) -> "Mapping[str, pd.DataFrame]":
         try:
-            return tables_of_channel(load_channel(options.data, name), settings.of(settings.noise, seed), stages)
+            return tables_of_channel(
+                load_channel(options.data, name), settings.of(settings.noise, seed), stages
+            )
         except InputError as error:  # a channel that cannot be used
             skipped[name] = str(error)
             tell(f"left out: {error}")
@@ -51,13 +59,24 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
                 raise
             return {}
 
-    found = run_study("spacecraft", tables_of, channels, options, settings, out, {"skipped": skipped})
+    found = run_study(
+        "spacecraft", tables_of, channels, options, settings, out, {"skipped": skipped}
+    )
     if set(channels) - set(skipped) >= {CHANNEL}:
-        save(PICTURE, "channel", stretches(load_channel(options.data, CHANNEL)), out, KEPT.command, settings.budget == "smoke")
+        save(
+            PICTURE,
+            "channel",
+            stretches(load_channel(options.data, CHANNEL)),
+            out,
+            KEPT.command,
+            settings.budget == "smoke",
+        )
     return found
 
 
-def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stages) -> "dict[str, pd.DataFrame]":
+def tables_of_channel(
+    channel: LabelledChannel, settings: Settings, stages: Stages
+) -> "dict[str, pd.DataFrame]":
     """Fits both simulators to a channel with one seed, and judges everything on its test part.
 
     Raises:
@@ -66,11 +85,15 @@ def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stag
     import pandas as pd
 
     name = channel.name
-    checksums = [zlib.crc32(np.ascontiguousarray(part.values)) for part in (channel.train, channel.test)]
+    checksums = [
+        zlib.crc32(np.ascontiguousarray(part.values)) for part in (channel.train, channel.test)
+    ]
     depends = (checksums, settings.spacecraft, settings.seed)
     fits = {}
     for enhancer in ENHANCERS:
-        fit = functools.partial(_fit, channel=channel, enhancer=enhancer, settings=settings, stages=stages)
+        fit = functools.partial(
+            _fit, channel=channel, enhancer=enhancer, settings=settings, stages=stages
+        )
         fits[enhancer] = stages.run(f"fit {name} {enhancer}", fit, depends, version=3)
 
     def judge(folder: Path) -> None:
@@ -78,17 +101,26 @@ def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stag
 
         simulators = [EnhancedSimulator.load(path / "simulator") for path in fits.values()]
         for table, rows in judge_channel(channel, *simulators, settings, stages).items():
-            pd.DataFrame(rows).assign(channel=name, seed=settings.seed).to_parquet(folder / f"{table}.parquet")
+            pd.DataFrame(rows).assign(channel=name, seed=settings.seed).to_parquet(
+                folder / f"{table}.parquet"
+            )
 
-    folder = stages.run(f"judge {name}", judge, depends, after=[f"fit {name} {enhancer}" for enhancer in ENHANCERS])
+    folder = stages.run(
+        f"judge {name}", judge, depends, after=[f"fit {name} {enhancer}" for enhancer in ENHANCERS]
+    )
     return {table: pd.read_parquet(folder / f"{table}.parquet") for table in KEPT.names}
 
 
-def _fit(folder: Path, channel: LabelledChannel, enhancer: str, settings: Settings, stages: Stages) -> None:
+def _fit(
+    folder: Path, channel: LabelledChannel, enhancer: str, settings: Settings, stages: Stages
+) -> None:
     from enhsim_tf.simulator.fitting import fit
     from enhsim_tf.simulator.options import FitOptions
 
-    chosen, counts = settings.spacecraft, {"noise": "residual windows", "held_out": 0.0, "seed": settings.seed, "enhancer": enhancer}
+    chosen, counts = (
+        settings.spacecraft,
+        {"noise": "residual windows", "held_out": 0.0, "seed": settings.seed, "enhancer": enhancer},
+    )
     options = FitOptions(num_windows=chosen.num_windows, epochs=chosen.epochs, **counts)
     simulator, _ = fit(channel.train, options=options, progress=stages.progress)
     if simulator.alignment.simulators[0].is_constant:
@@ -100,7 +132,11 @@ def _fit(folder: Path, channel: LabelledChannel, enhancer: str, settings: Settin
 
 
 def judge_channel(
-    channel: LabelledChannel, network: "EnhancedSimulator", ridge: "EnhancedSimulator", settings: Settings, stages: Stages
+    channel: LabelledChannel,
+    network: "EnhancedSimulator",
+    ridge: "EnhancedSimulator",
+    settings: Settings,
+    stages: Stages,
 ) -> dict[str, list[dict[str, Any]]]:
     """The rows of all tables for a channel to which two simulators are fitted, with the paper's network and with ridge regression."""
     from studies.spacecraft.enhancement import error_rows
@@ -112,7 +148,11 @@ def judge_channel(
     period = max(wave.period_s for wave in network.alignment.simulators[0].waves) / train.interval_s
     judge = Judge(channel, window, period, settings.spacecraft.false_alarm_rate)
     generated = generators(train, network, ridge, settings, stages.progress)
-    about = {"train_samples": len(train), "window": window, "num_nominal": int(judge.is_nominal.sum())}
+    about = {
+        "train_samples": len(train),
+        "window": window,
+        "num_nominal": int(judge.is_nominal.sum()),
+    }
     return {
         "channels": [about],
         "enhancement": error_rows(network, ridge, channel),

@@ -38,10 +38,19 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     references = rows[rows["training"] == REFERENCE]
     controls = rows[(rows["training"] == REAL) & rows["detector"].isin(CONTROLS)]
     return {
-        "sources": {name: _results(each) | {"by_detector": _by_detector(each)} for name, each in trained.groupby("training", sort=False)},
-        "references": {name: _results(each) for name, each in references.groupby("detector", sort=False)},
-        "controls": {name: _results(each) for name, each in controls.groupby("detector", sort=False)},
-        "channels": {name: _channel(tables, name) for name in dict.fromkeys(tables["channels"]["channel"])},
+        "sources": {
+            name: _results(each) | {"by_detector": _by_detector(each)}
+            for name, each in trained.groupby("training", sort=False)
+        },
+        "references": {
+            name: _results(each) for name, each in references.groupby("detector", sort=False)
+        },
+        "controls": {
+            name: _results(each) for name, each in controls.groupby("detector", sort=False)
+        },
+        "channels": {
+            name: _channel(tables, name) for name in dict.fromkeys(tables["channels"]["channel"])
+        },
         "num_sequences": int(rows.groupby("channel")["sequences"].first().sum()),
         "seeds": sorted(set(rows["seed"].tolist())),
     }
@@ -54,19 +63,30 @@ def _results(rows: "pd.DataFrame") -> dict[str, Any]:
     return {
         "false_alarms": mean_interval(means["false_alarms"], levels),
         "false_alarms_past": float(rows["false_alarms_past"].mean()),
-        "found": {f"{rate:g}": float(rows[f"found_at_{rate:g}"].sum() / rows["sequences"].sum()) for rate in RATES},
+        "found": {
+            f"{rate:g}": float(rows[f"found_at_{rate:g}"].sum() / rows["sequences"].sum())
+            for rate in RATES
+        },
         "auc_pr": mean_interval(means["auc_pr"], levels),
     }
 
 
 def _by_detector(rows: "pd.DataFrame") -> dict[str, Any]:
     means = rows.groupby("detector", sort=False)[["false_alarms", "auc_pr"]].mean()
-    return {detector: {name: float(value) for name, value in each.items()} for detector, each in means.iterrows()}
+    return {
+        detector: {name: float(value) for name, value in each.items()}
+        for detector, each in means.iterrows()
+    }
 
 
 def _channel(tables: "Mapping[str, pd.DataFrame]", name: str) -> dict[str, Any]:
     about = tables["channels"].query("channel == @name").iloc[0]
-    errors = tables["enhancement"].query("channel == @name").groupby("method", sort=False)["nrmse"].mean()
+    errors = (
+        tables["enhancement"]
+        .query("channel == @name")
+        .groupby("method", sort=False)["nrmse"]
+        .mean()
+    )
     return {
         "num_train_windows": int(about["train_samples"] // about["window"]),
         "num_nominal": int(about["num_nominal"]),

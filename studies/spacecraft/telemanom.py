@@ -60,18 +60,24 @@ def read_labels(folder: str | os.PathLike) -> dict[str, Ranges]:
 
     path, columns = Path(folder) / LABELS, ["chan_id", "anomaly_sequences"]
     try:
-        rows = pd.read_csv(path, usecols=columns, dtype=str, keep_default_na=False, encoding="utf-8-sig")
+        rows = pd.read_csv(
+            path, usecols=columns, dtype=str, keep_default_na=False, encoding="utf-8-sig"
+        )
     except (OSError, ValueError) as error:  # pandas raises kinds of ValueError
         raise InputError(
             f"Expected a folder with train/, test/ and {LABELS}, which has the columns {' and '.join(columns)}. "
             f"Received: {str(error).splitlines()[0]} in {folder}. Name the data set's folder."
         ) from None
     if rows.empty:
-        raise InputError(f"Expected labelled channels. Received: none in {path}. Add a line for each.")
+        raise InputError(
+            f"Expected labelled channels. Received: none in {path}. Add a line for each."
+        )
     found: dict[str, list[tuple[int, int]]] = {}
     for channel, text in rows[columns].itertuples(index=False):
         if Path(channel).name != channel:
-            raise InputError(f"Expected a channel's name. Received: {channel!r} in {path}. Correct the line.")
+            raise InputError(
+                f"Expected a channel's name. Received: {channel!r} in {path}. Correct the line."
+            )
         found.setdefault(channel, []).extend(_sequences(text, channel))
     return {channel: _joined(sequences) for channel, sequences in found.items()}
 
@@ -79,7 +85,9 @@ def read_labels(folder: str | os.PathLike) -> dict[str, Ranges]:
 def _sequences(text: str, channel: str) -> list[tuple[int, int]]:
     try:
         ranges = [(start, end + 1) for start, end in ast.literal_eval(text)]
-        is_good = all(type(bound) is int for pair in ranges for bound in pair) and all(0 <= start < stop for start, stop in ranges)
+        is_good = all(type(bound) is int for pair in ranges for bound in pair) and all(
+            0 <= start < stop for start, stop in ranges
+        )
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
         is_good = False
     if not is_good:
@@ -112,7 +120,9 @@ def load_channel(folder: str | os.PathLike, channel: str) -> LabelledChannel:
     """
     labels = read_labels(folder)
     if channel not in labels:
-        raise InputError(f"Expected a labelled channel, one of: {', '.join(list(labels)[:8])}. Received: {channel!r}. Name one of these.")
+        raise InputError(
+            f"Expected a labelled channel, one of: {', '.join(list(labels)[:8])}. Received: {channel!r}. Name one of these."
+        )
     train, test = (_read(Path(folder) / part, channel) for part in ("train", "test"))
     for start, _ in labels[channel]:
         if start >= len(test):
@@ -128,5 +138,7 @@ def _read(folder: Path, channel: str) -> Telemetry:
     path = folder / f"{channel}.npy"
     values = next(iter(read_source(path).values())).to_numpy(np.float32)
     if not np.isfinite(values).all():
-        raise InputError(f"Expected finite values. Received: NaN or infinity in {path}. Clean it and save it again.")
+        raise InputError(
+            f"Expected finite values. Received: NaN or infinity in {path}. Clean it and save it again."
+        )
     return Telemetry(values, name=channel)

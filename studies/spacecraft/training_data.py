@@ -25,7 +25,11 @@ REAL = "real"
 
 
 def generators(
-    train: Telemetry, simulator: "EnhancedSimulator", ridge: "EnhancedSimulator", settings: Settings, progress: Progress
+    train: Telemetry,
+    simulator: "EnhancedSimulator",
+    ridge: "EnhancedSimulator",
+    settings: Settings,
+    progress: Progress,
 ) -> dict[str, Callable[[int], np.ndarray]]:
     """Functions from a seed to generated windows, by the name of the training data.
 
@@ -40,7 +44,9 @@ def generators(
     """
     chosen, window = settings.spacecraft, simulator.window
     number = chosen.num_arm_windows
-    starts = random_window_starts([train], window, chosen.num_windows, np.random.default_rng([settings.seed, 1]))
+    starts = random_window_starts(
+        [train], window, chosen.num_windows, np.random.default_rng([settings.seed, 1])
+    )
     windows = cut_windows(train.values, starts, window)[:, :, None]
     residuals = (windows - simulator.enhance(*simulator.alignment.align(windows)))[:, :, 0]
     noises = {
@@ -49,19 +55,28 @@ def generators(
     }
 
     def enhanced(noise: Any, seed: int) -> np.ndarray:
-        return simulator.generate(number, seed=seed, with_noise=False)[:, :, 0] + noise.generate(number, np.random.default_rng(seed))
+        return simulator.generate(number, seed=seed, with_noise=False)[:, :, 0] + noise.generate(
+            number, np.random.default_rng(seed)
+        )
 
-    return {f"enhanced + {name}": functools.partial(enhanced, noise) for name, noise in noises.items()} | {
-        "ridge + residual windows": lambda seed: ridge.generate(number, seed=seed)[:, :, 0]
-    }
+    return {
+        f"enhanced + {name}": functools.partial(enhanced, noise) for name, noise in noises.items()
+    } | {"ridge + residual windows": lambda seed: ridge.generate(number, seed=seed)[:, :, 0]}
 
 
-def _fit_paper_gan(residuals: np.ndarray, num_iterations: int, seed: int, progress: Progress) -> Any:
+def _fit_paper_gan(
+    residuals: np.ndarray, num_iterations: int, seed: int, progress: Progress
+) -> Any:
     from enhsim_tf.paper.settings import make_settings
     from studies.common.paper_gan import PaperGAN
 
     told = progress.loop("noise GAN, iteration", num_iterations)
-    chosen = make_settings(seed=seed, window=residuals.shape[1], iterations=num_iterations, record_every=min(100, num_iterations))
+    chosen = make_settings(
+        seed=seed,
+        window=residuals.shape[1],
+        iterations=num_iterations,
+        record_every=min(100, num_iterations),
+    )
     return PaperGAN(residuals, chosen, 10 * float(np.std(residuals, dtype=np.float64)), told)
 
 
@@ -85,13 +100,18 @@ class BlockBootstrap:
         chain = (number, -(-samples // self.block) + 1)
         sources = rng.integers(0, len(self.windows), chain)
         begins = rng.integers(0, samples - self.block + 1, chain)
-        places = np.arange(samples) + rng.integers(0, self.block, (number, 1))  # a window starts at a random position of its first block
+        places = np.arange(samples) + rng.integers(
+            0, self.block, (number, 1)
+        )  # a window starts at a random position of its first block
         rows, blocks = np.arange(number)[:, None], places // self.block
         return self.windows[sources[rows, blocks], begins[rows, blocks] + places % self.block]
 
 
 def source_rows(
-    judge: Judge, train: Telemetry, generated: dict[str, Callable[[int], np.ndarray]], settings: Settings
+    judge: Judge,
+    train: Telemetry,
+    generated: dict[str, Callable[[int], np.ndarray]],
+    settings: Settings,
 ) -> list[dict[str, Any]]:
     """Trains every detector on all training data, and the controls on the real windows, and judges them on the test part.
 
@@ -105,12 +125,17 @@ def source_rows(
     windows = cut_windows(train.values, starts, judge.window)
     rows, seed = [], settings.seed
     for name, make in (DETECTORS | CONTROLS).items():
-        past = cross_fitted_scores(functools.partial(make, seed), windows, starts, settings.spacecraft.num_folds)
+        past = cross_fitted_scores(
+            functools.partial(make, seed), windows, starts, settings.spacecraft.num_folds
+        )
         found = judge.judge(make(seed).fit(windows).score(judge.windows), past, past)
         rows.append({"training": REAL, "detector": name} | found)
     for training, generate in generated.items():
         learnt, held_out = (check_finite(generate(seed + number)) for number in (1, 2))
         for name, make in DETECTORS.items():
             score = make(seed).fit(learnt).score
-            rows.append({"training": training, "detector": name} | judge.judge(score(judge.windows), score(held_out), score(windows)))
+            rows.append(
+                {"training": training, "detector": name}
+                | judge.judge(score(judge.windows), score(held_out), score(windows))
+            )
     return rows

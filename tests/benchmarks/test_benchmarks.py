@@ -12,7 +12,13 @@ from benchmarks.worker import Worker
 
 def test_ways_take_turns():
     calls = []
-    found = rows.in_turns({"a": lambda: calls.append("a") or len(calls), "b": lambda: calls.append("b") or len(calls)}, 3)
+    found = rows.in_turns(
+        {
+            "a": lambda: calls.append("a") or len(calls),
+            "b": lambda: calls.append("b") or len(calls),
+        },
+        3,
+    )
     assert "".join(calls) == "baabba"
     assert found == {"a": [2, 3, 6], "b": [1, 4, 5]}
 
@@ -22,7 +28,9 @@ def test_a_row_compares_neighbours():
     assert row["ours"] == {"median": 2.0, "low": 1.0, "high": 9.0}
     assert row["ratio"] == pytest.approx({"median": 1.0, "low": 0.5, "high": 3.0})
     skipped = {"work": "a", "comparison": "b", "skipped": "no c"}
-    assert speed_table([row, row | {"target": 1.0}, row | {"target": None}, skipped]).splitlines()[2:] == [
+    assert speed_table([row, row | {"target": 1.0}, row | {"target": None}, skipped]).splitlines()[
+        2:
+    ] == [
         "| work | 2 ms | other | 1.00 (0.50 to 3.00) | at most 0.90 | **no** |",
         "| work | 2 ms | other | 1.00 (0.50 to 3.00) | at most 1.00 | yes |",
         "| work | 2 ms | other | 1.00 (0.50 to 3.00) |  |  |",

@@ -23,33 +23,54 @@ def table(**more):
 
 def fitted(tmp_path, columns, separately=False, workers=None):
     lines, chosen = [], {"chosen": OPTIONS, "cleaning": Cleaning(), "engine": "local", "json": True}
-    options = argparse.Namespace(out=tmp_path / "models", separately=separately, workers=workers, **chosen)
+    options = argparse.Namespace(
+        out=tmp_path / "models", separately=separately, workers=workers, **chosen
+    )
     return (*fit.fit_channels(columns, options, lines.append), lines)
 
 
 def test_all_channels_become_one_simulator_and_one_that_cannot_is_left_out(tmp_path):
     reports, failed, lines = fitted(tmp_path, table(still=np.ones(1_500)))
-    assert list(reports) == ["volts~watts"] and list(failed) == ["still"] and "constant" in failed["still"]
+    assert (
+        list(reports) == ["volts~watts"]
+        and list(failed) == ["still"]
+        and "constant" in failed["still"]
+    )
     ((name, folder),) = models_of(tmp_path / "models").items()
     assert name_of_channels([f"channel {number}" for number in range(30)]) == "channel 0~29 more"
     assert name == "volts~watts" and channels_of(folder) == ("volts", "watts")
-    assert {path.name for path in folder.iterdir()} == {"arrays.npz", "settings.json", "manifest.json", "report.json", "report.png"}
+    assert {path.name for path in folder.iterdir()} == {
+        "arrays.npz",
+        "settings.json",
+        "manifest.json",
+        "report.json",
+        "report.png",
+    }
     assert any("cross-correlation" in line for line in lines)
 
 
 def test_separate_simulators_have_the_same_bytes_in_this_process_and_in_another(tmp_path):
     sums = []
     for workers in (0, 1):
-        reports, failed, lines = fitted(tmp_path / "both", table(), separately=True, workers=workers)
+        reports, failed, lines = fitted(
+            tmp_path / "both", table(), separately=True, workers=workers
+        )
         assert sorted(reports) == ["volts", "watts"] and not failed
         folder = tmp_path / "both" / "models"
         assert sum("in place of the one that was there" in line for line in lines) == 2 * workers
-        sums.append([hashlib.sha256((folder / name / "arrays.npz").read_bytes()).hexdigest() for name in ("volts", "watts")])
+        sums.append(
+            [
+                hashlib.sha256((folder / name / "arrays.npz").read_bytes()).hexdigest()
+                for name in ("volts", "watts")
+            ]
+        )
     assert sums[0] == sums[1]
 
 
 def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
-    fast = pd.Series(series(6_000).values, pd.date_range("2024-01-01", periods=6_000, freq="1s", tz="UTC"))
+    fast = pd.Series(
+        series(6_000).values, pd.date_range("2024-01-01", periods=6_000, freq="1s", tz="UTC")
+    )
     reports, failed, _ = fitted(tmp_path, table() | {"fast": fast})
     assert sorted(reports) == ["fast", "volts~watts"] and not failed
 
@@ -66,6 +87,8 @@ def test_a_channel_that_kills_its_workers_is_reported_and_stops_no_other(tmp_pat
             yield fit.Outcome(name, lines=[name])
 
     monkeypatch.setattr(fit.engines, "run", run)
-    _, failed, lines = fitted(tmp_path, dict.fromkeys(["a", "bad", "c", "d"]), separately=True, workers=4)
+    _, failed, lines = fitted(
+        tmp_path, dict.fromkeys(["a", "bad", "c", "d"]), separately=True, workers=4
+    )
     assert list(failed) == ["bad"] and "Memory" in failed["bad"] and lines == ["a", "c", "d"]
     assert tried == [["a", "bad", "c", "d"], ["c", "d"]]

@@ -12,7 +12,9 @@ class Heater(Fmi2Slave):
         self.power, self.celsius = 0.0, 20.0
         self.register_variable(Real("command", causality=Fmi2Causality.input))
         for name in ("efficiency", "loss"):
-            self.register_variable(Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+            self.register_variable(
+                Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+            )
         for name in ("power", "celsius"):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
 

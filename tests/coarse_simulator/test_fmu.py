@@ -10,7 +10,9 @@ from enhsim_tf.coarse_simulator.interface import CoarseSimulator, simulate
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 
 pytest.importorskip("fmpy", reason="the extra fmi is not installed: pip install 'enhsim_tf[fmi]'")
-builder = pytest.importorskip("pythonfmu.builder", reason="pythonfmu, which builds the FMU, is not installed")
+builder = pytest.importorskip(
+    "pythonfmu.builder", reason="pythonfmu, which builds the FMU, is not installed"
+)
 TIMES = 10.0 * np.arange(200)
 
 
@@ -31,7 +33,9 @@ def expected(efficiency=1.0, loss=0.005):
     command = commands().parts[0].values[:, 0]
     for step in range(199):
         power[step + 1] = efficiency * command[step]
-        celsius[step + 1] = celsius[step] + 10 * (0.1 * power[step + 1] - loss * (celsius[step] - 20))
+        celsius[step + 1] = celsius[step] + 10 * (
+            0.1 * power[step + 1] - loss * (celsius[step] - 20)
+        )
     return np.stack([power, celsius], axis=1)
 
 

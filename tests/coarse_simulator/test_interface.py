@@ -35,8 +35,14 @@ def test_a_function_and_an_object_are_simulators():
 def test_square_waves_have_the_interface():
     waves = SquareWaveSimulator([SquareWave(40)])
     assert isinstance(waves, CoarseSimulator)
-    scenario, one, other = Degraded("friction", 0.9), np.random.default_rng(3), np.random.default_rng(3)
-    np.testing.assert_array_equal(simulate(waves, TIMES, scenario, one)[:, 0], waves.simulate(TIMES[None], scenario, other)[0])
+    scenario, one, other = (
+        Degraded("friction", 0.9),
+        np.random.default_rng(3),
+        np.random.default_rng(3),
+    )
+    np.testing.assert_array_equal(
+        simulate(waves, TIMES, scenario, one)[:, 0], waves.simulate(TIMES[None], scenario, other)[0]
+    )
     assert one.random() == other.random()  # the comparison with the nominal run draws nothing
     simulate(waves, TIMES, Degraded("stuck", 0.0))  # severity 0 is nominal by definition
 
@@ -78,5 +84,7 @@ def test_a_recorded_simulation_keeps_times_and_labels():
     assert (run.columns, run.interval_s, part.offset_s, len(run)) == (("level",), 2.0, 6.0, 50)
     assert set(part.carried["scenario"]) == {"leak"} and part.carried["severity"].shape == (50,)
     np.testing.assert_allclose(
-        run.run(np.array([8.0, 9.0]))[:, 0], [np.exp(-8 / 25), np.exp(-8 / 25) / 2 + np.exp(-10 / 25) / 2], rtol=1e-6
+        run.run(np.array([8.0, 9.0]))[:, 0],
+        [np.exp(-8 / 25), np.exp(-8 / 25) / 2 + np.exp(-10 / 25) / 2],
+        rtol=1e-6,
     )

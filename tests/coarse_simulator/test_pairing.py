@@ -15,7 +15,9 @@ START = "2024-01-01T00:00:00+00:00"
 
 def drive(num_samples=2_000, seed=0):
     """A smooth signal that does not repeat."""
-    return np.convolve(np.random.default_rng(seed).standard_normal(num_samples), np.hanning(15), "same")
+    return np.convolve(
+        np.random.default_rng(seed).standard_normal(num_samples), np.hanning(15), "same"
+    )
 
 
 def pair_of(values, delay, others=(), interval_s=10.0, noise=0.3):
@@ -23,7 +25,12 @@ def pair_of(values, delay, others=(), interval_s=10.0, noise=0.3):
     rng = np.random.default_rng(1)
     telemetry = np.roll(values, delay) + noise * values.std() * rng.standard_normal(len(values))
     columns = np.stack([*others, values], axis=1).astype(np.float32)
-    recording = Recording((Run(columns),), tuple(f"c{number}" for number in range(columns.shape[1])), interval_s, START)
+    recording = Recording(
+        (Run(columns),),
+        tuple(f"c{number}" for number in range(columns.shape[1])),
+        interval_s,
+        START,
+    )
     return Telemetry(telemetry.astype(np.float32), interval_s, 0.0, START, "volts"), recording
 
 
@@ -44,11 +51,25 @@ def test_a_delay_is_recovered_across_gaps_and_a_negative_correlation():
     telemetry, recording = pair_of(-drive(), 7)
     telemetry = dataclasses.replace(telemetry, values=-telemetry.values)
     parts = [telemetry.part(0, 700), telemetry.part(760, 1_500), telemetry.part(1_530, 2_000)]
-    recording = dataclasses.replace(recording, parts=(Run(recording.parts[0].values[:900]), Run(recording.parts[0].values[950:], 9_500.0)))
+    recording = dataclasses.replace(
+        recording,
+        parts=(Run(recording.parts[0].values[:900]), Run(recording.parts[0].values[950:], 9_500.0)),
+    )
     found = estimate_delay(parts, recording, 64)
     coarse = recording.at(10.0 * np.arange(2_000) - 70.0)[:, 0]
-    there = np.isfinite(coarse) & np.r_[np.full(700, True), np.full(60, False), np.full(740, True), np.full(30, False), np.full(470, True)]
-    assert found.seconds == 70 and found.correlation == pytest.approx(np.corrcoef(coarse[there], telemetry.values[there])[0, 1], abs=1e-6)
+    there = (
+        np.isfinite(coarse)
+        & np.r_[
+            np.full(700, True),
+            np.full(60, False),
+            np.full(740, True),
+            np.full(30, False),
+            np.full(470, True),
+        ]
+    )
+    assert found.seconds == 70 and found.correlation == pytest.approx(
+        np.corrcoef(coarse[there], telemetry.values[there])[0, 1], abs=1e-6
+    )
 
 
 def test_of_the_equal_maxima_of_a_periodic_signal_the_nearest_is_taken():
@@ -61,12 +82,19 @@ def test_a_delay_longer_than_a_window_is_refused_with_the_delay_to_give(refused)
     with refused("at most a window, 64 samples", "--delay 2000"):
         estimate_delay([telemetry], recording, 64)
     found, run = pair_recordings(recorded([telemetry]), recording, 2_000.0)
-    assert found.parts[0].offset_s == 2_000 and np.corrcoef(found.values[:, 0], run.values[:, 0])[0, 1] > 0.9
+    assert (
+        found.parts[0].offset_s == 2_000
+        and np.corrcoef(found.values[:, 0], run.values[:, 0])[0, 1] > 0.9
+    )
 
 
 def test_both_are_cut_to_the_time_they_share():
     telemetry, recording = pair_of(drive(), 0, noise=0)
-    recording = dataclasses.replace(recording, start="2024-01-01T00:10:00+00:00", parts=(Run(recording.parts[0].values[60:1_000]),))
+    recording = dataclasses.replace(
+        recording,
+        start="2024-01-01T00:10:00+00:00",
+        parts=(Run(recording.parts[0].values[60:1_000]),),
+    )
     parts = [telemetry.part(0, 500), telemetry.part(520, 2_000)]
     found, run = pair_recordings(recorded(parts), recording)
     assert [(part.offset_s, len(part)) for part in found.parts] == [(600.0, 440), (5_200.0, 480)]

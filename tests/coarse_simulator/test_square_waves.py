@@ -4,12 +4,19 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, fit_box, level_offset_and_scale
+from enhsim_tf.coarse_simulator.square_waves import (
+    SquareWave,
+    SquareWaveSimulator,
+    fit_box,
+    level_offset_and_scale,
+)
 from enhsim_tf.paper import degraded as of_paper
 from enhsim_tf.paper.degraded import MODES
 from enhsim_tf.telemetry.series import Telemetry
 
-TWO = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)])
+TWO = SquareWaveSimulator(
+    [SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)]
+)
 TIMES = 10.0 + np.arange(400.0) + np.array([[0.0], [37.0], [1_000.0]])
 ONSET = 100  # a quarter of the 400 samples
 
@@ -19,13 +26,25 @@ ONSET = 100  # a quarter of the 400 samples
 
 def test_square_wave_by_hand():
     wave = SquareWave(period_s=4, low=-1, high=3)
-    assert wave(np.array([-4.0, -1, 0, 1, 2, 3, 4, 5.9, 6])).tolist() == [3, -1, 3, 3, -1, -1, 3, 3, -1]
+    assert wave(np.array([-4.0, -1, 0, 1, 2, 3, 4, 5.9, 6])).tolist() == [
+        3,
+        -1,
+        3,
+        3,
+        -1,
+        -1,
+        3,
+        3,
+        -1,
+    ]
     wave = SquareWave(period_s=8, phase=0.25, duty=0.75, low=0, high=1)
     # a quarter of a period ahead: the six high samples of eight began two samples ago
     assert wave(np.arange(8.0)).tolist() == [1, 1, 1, 1, 0, 0, 1, 1]
 
 
-@pytest.mark.parametrize("argument", [{"period_s": 0}, {"duty": 0}, {"duty": 1}, {"high": np.nan}], ids=str)
+@pytest.mark.parametrize(
+    "argument", [{"period_s": 0}, {"duty": 0}, {"duty": 1}, {"high": np.nan}], ids=str
+)
 def test_bad_wave_is_refused(refused, argument):
     with refused("SquareWave("):
         SquareWave(**{"period_s": 10.0, **argument})
@@ -34,7 +53,9 @@ def test_bad_wave_is_refused(refused, argument):
 def test_simulator_is_the_sum_of_its_waves(refused):
     first, second = TWO.waves
     assert (TWO(TIMES) == first(TIMES) + second(TIMES)).all()
-    assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(TIMES).dtype == np.float32
+    assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(
+        TIMES
+    ).dtype == np.float32
     assert TWO.levels == (0.5, 2.0)
     assert level_offset_and_scale(TWO) == (1.25, 0.75)
     with refused("waves=[]"):
@@ -48,9 +69,19 @@ SHAPES = {
     "square": (lambda cycle: np.where(cycle < 0.3, 1.0, -1.0), 0.3, (-1.0, 1.0)),
     "sine": (lambda cycle: np.sin(2 * np.pi * cycle), 0.5, (-2 / np.pi, 2 / np.pi)),
     # a ramp takes a fifth of a period: half of the time above, 0.3 at 1 and 0.2 with a mean of 1/2
-    "trapezoid": (lambda cycle: np.clip(np.interp(cycle, [0, 0.1, 0.4, 0.6, 0.9, 1], [0, 1, 1, -1, -1, 0]), -1, 1), 0.5, (-0.8, 0.8)),
+    "trapezoid": (
+        lambda cycle: np.clip(
+            np.interp(cycle, [0, 0.1, 0.4, 0.6, 0.9, 1], [0, 1, 1, -1, -1, 0]), -1, 1
+        ),
+        0.5,
+        (-0.8, 0.8),
+    ),
 }
-CLOCKS = [(97.3, 1.0, 12_345.6), (31.7, 0.25, 40.0), (7_260.5, 60.0, -900.0)]  # period, interval, offset
+CLOCKS = [
+    (97.3, 1.0, 12_345.6),
+    (31.7, 0.25, 40.0),
+    (7_260.5, 60.0, -900.0),
+]  # period, interval, offset
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -60,14 +91,20 @@ def test_fit_recovers_a_noisy_wave(shape, period_s, interval_s, offset_s):
     mean, amplitude, rng, number = 20.0, 3.0, np.random.default_rng(0), 3_000
     ahead = rng.random()
     times = offset_s + interval_s * np.arange(number)
-    values = mean + amplitude * (wave(np.mod(times / period_s + ahead, 1.0)) + 0.2 * rng.standard_normal(number))
+    values = mean + amplitude * (
+        wave(np.mod(times / period_s + ahead, 1.0)) + 0.2 * rng.standard_normal(number)
+    )
     telemetry = Telemetry(values.astype(np.float32), interval_s=interval_s, offset_s=offset_s)
     train, test = telemetry.part(0, 2_030), telemetry.part(2_130, number)
 
     (fitted,) = SquareWaveSimulator.fit(train).waves
     assert fitted.period_s == pytest.approx(period_s, rel=0.005)
-    assert fitted.duty == pytest.approx(duty, abs=0.03)  # on a slope, the edge of the box is not well determined
-    assert (fitted.low, fitted.high) == pytest.approx((mean + amplitude * low, mean + amplitude * high), abs=0.05 * amplitude)
+    assert fitted.duty == pytest.approx(
+        duty, abs=0.03
+    )  # on a slope, the edge of the box is not well determined
+    assert (fitted.low, fitted.high) == pytest.approx(
+        (mean + amplitude * low, mean + amplitude * high), abs=0.05 * amplitude
+    )
 
     # the phase also holds at later times that were not fitted
     truth = np.where(np.mod(test.time_s / period_s + ahead, 1.0) < duty, 1, 0)
@@ -75,7 +112,10 @@ def test_fit_recovers_a_noisy_wave(shape, period_s, interval_s, offset_s):
 
 
 def test_fit_refuses_a_series_without_a_period(refused):
-    for values in (np.ones(300), np.array([1.0, -1, 1, -1, 1, -1])):  # a constant; fewer than four samples per period
+    for values in (
+        np.ones(300),
+        np.array([1.0, -1, 1, -1, 1, -1]),
+    ):  # a constant; fewer than four samples per period
         with refused("wheel"):
             SquareWaveSimulator.fit(Telemetry(values.astype(np.float32), name="wheel"))
 
@@ -87,7 +127,9 @@ def test_box_finds_the_fundamental_under_a_stronger_harmonic():
     strongest = np.argsort(np.abs(np.fft.rfft(values - values.mean())))[::-1][:12] * 100 / 4_000
     assert (strongest % 2 == 0).all()
     frequency, _, duty, _, high = fit_box(values)
-    assert (frequency, high) == pytest.approx((1 / 100, 1.0), rel=0.001) and duty == pytest.approx(0.02, abs=0.006)
+    assert (frequency, high) == pytest.approx((1 / 100, 1.0), rel=0.001) and duty == pytest.approx(
+        0.02, abs=0.006
+    )
 
 
 # degraded modes
@@ -96,12 +138,23 @@ def test_box_finds_the_fundamental_under_a_stronger_harmonic():
 def degrade(signal, times, scenario, levels, rng=0):
     """Degrades a signal whose shortest period is 40 s, as the coarse simulator is degraded."""
     onset = scenario.first_sample(times.shape[1])
-    return of_paper.degrade(signal, times, scenario.mode, scenario.severity, levels, 40.0, np.random.default_rng(rng), onset)
+    return of_paper.degrade(
+        signal,
+        times,
+        scenario.mode,
+        scenario.severity,
+        levels,
+        40.0,
+        np.random.default_rng(rng),
+        onset,
+    )
 
 
 def by_time(mode, severity, onset=0.25, rng=0):
     """Degrades a signal that returns the time itself, which shows how the mode changes the mechanism's time."""
-    return degrade(lambda time: time.copy(), TIMES, Degraded(mode, severity, onset), (-1.0, 3.0), rng)
+    return degrade(
+        lambda time: time.copy(), TIMES, Degraded(mode, severity, onset), (-1.0, 3.0), rng
+    )
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -121,7 +174,9 @@ def test_nominal_to_the_bit_before_the_onset_and_not_after(mode):
 @pytest.mark.parametrize("onset", [0.0, 0.29, 0.57])
 def test_onset_is_the_sample_asked_for(onset):
     times = np.arange(100.0)[None]
-    values = degrade(lambda time: 5 + 0 * time, times, Degraded("gain_loss", 1.0, onset), (0.0, 2.0))
+    values = degrade(
+        lambda time: 5 + 0 * time, times, Degraded("gain_loss", 1.0, onset), (0.0, 2.0)
+    )
     assert np.argmax(values[0] != 5) == round(100 * onset)
 
 
@@ -142,7 +197,9 @@ def test_friction_delays_by_a_bounded_lag_and_never_reverses():
     assert lag.max() <= severity * 40 / 4
     assert lag.max() > 0.9 * severity * 40 / 4  # 3 x 30 uniform lags
     assert np.diff(clock, axis=1).min() >= -1e-9
-    assert len({tuple(np.round(row, 6)) for row in lag[:, ONSET:]}) == 3  # each window has its own lags
+    assert (
+        len({tuple(np.round(row, 6)) for row in lag[:, ONSET:]}) == 3
+    )  # each window has its own lags
 
 
 def test_dropout_reads_the_lowest_level_in_runs_of_ten():

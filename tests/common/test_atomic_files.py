@@ -24,7 +24,11 @@ def killed(source, destination):
 
 
 def content_of(folder):
-    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_text()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 def names_in(folder):
@@ -68,7 +72,9 @@ def test_replace_folder_replaces_whatever_is_there(tmp_path, before):
         path.symlink_to(tmp_path / "elsewhere")
     with replace_folder(path) as temporary:
         (temporary / "inside").write_text("new")
-    assert content_of(tmp_path) == {"above/model/inside": "new"} and names_in(path.parent) == ["model"]
+    assert content_of(tmp_path) == {"above/model/inside": "new"} and names_in(path.parent) == [
+        "model"
+    ]
 
 
 @pytest.mark.parametrize("what", ["file", "folder"])
@@ -83,7 +89,10 @@ def test_an_interrupt_keeps_the_old_content(tmp_path, what, before):
     with pytest.raises(KeyboardInterrupt), replace(path) as temporary:
         (temporary / "inside" if what == "folder" else temporary).write_text("half")
         raise KeyboardInterrupt
-    assert list(content_of(tmp_path).values()) == ["old"] * before and len(names_in(tmp_path)) == before
+    assert (
+        list(content_of(tmp_path).values()) == ["old"] * before
+        and len(names_in(tmp_path)) == before
+    )
 
 
 def test_a_failure_between_the_two_renames_restores_the_old_content(tmp_path, monkeypatch):
@@ -148,9 +157,13 @@ def test_files_that_only_look_like_leftovers_stay(tmp_path):
 
 def test_replace_folder_keeps_the_old_content_if_keep_says_so(tmp_path):
     for text, expected in (("broken", "broken"), ("whole", "whole"), ("other", "whole")):
-        with replace_folder(tmp_path / "stage", lambda found: (found / "inside").read_text() == "whole") as temporary:
+        with replace_folder(
+            tmp_path / "stage", lambda found: (found / "inside").read_text() == "whole"
+        ) as temporary:
             (temporary / "inside").write_text(text)
-        assert content_of(tmp_path) == {"stage/inside": expected} and names_in(tmp_path) == ["stage"]
+        assert content_of(tmp_path) == {"stage/inside": expected} and names_in(tmp_path) == [
+            "stage"
+        ]
 
 
 def test_many_writers_at_once_leave_one_whole_folder(tmp_path):
@@ -162,7 +175,10 @@ for number in range(50):
         for name in "ab":
             (temporary / name).write_text(sys.argv[2])
 """
-    writers = [subprocess.Popen([sys.executable, "-c", script, str(tmp_path / "model"), name], cwd=ROOT) for name in ("x", "y", "z")]
+    writers = [
+        subprocess.Popen([sys.executable, "-c", script, str(tmp_path / "model"), name], cwd=ROOT)
+        for name in ("x", "y", "z")
+    ]
     assert [writer.wait() for writer in writers] == [0, 0, 0]
     assert len(set(content_of(tmp_path).values())) == 1 and names_in(tmp_path) == ["model"]
 
@@ -172,6 +188,11 @@ def test_json_without_nan_and_its_checksum(tmp_path):
     atomic_files.write_json(path, {"a": [1, 2.5, None, "é"]})
     with pytest.raises(ValueError, match="not JSON compliant"):
         atomic_files.write_json(path, {"a": float("nan")})
-    assert json.loads(path.read_text(encoding="utf-8")) == {"a": [1, 2.5, None, "é"]} and names_in(tmp_path) == ["results.json"]
+    assert json.loads(path.read_text(encoding="utf-8")) == {"a": [1, 2.5, None, "é"]} and names_in(
+        tmp_path
+    ) == ["results.json"]
     path.write_bytes(b"abc")  # FIPS 180-2, appendix B.1
-    assert atomic_files.sha256(path) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    assert (
+        atomic_files.sha256(path)
+        == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    )

@@ -17,12 +17,24 @@ def run(code, **environment):
     """Runs code in a separate process, whose environment contains only the given settings."""
     ours = ("TF_", "ONEDNN_", "DNNL_", "KERAS_", "MALLOC_", "GLIBC_TUNABLES")
     clean = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
-    return subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=clean | environment, capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env=clean | environment,
+        capture_output=True,
+        text=True,
+    )
 
 
 def test_it_starts_without_a_message_and_gives_standard_error_back():
-    ended = run(START + STATE + "import os, sys\nprint('heard', file=sys.stderr)\nos.write(2, b'again')")
-    assert (ended.stdout, ended.stderr, ended.returncode) == ("True,tensorflow\n", "heard\nagain", 0)
+    ended = run(
+        START + STATE + "import os, sys\nprint('heard', file=sys.stderr)\nos.write(2, b'again')"
+    )
+    assert (ended.stdout, ended.stderr, ended.returncode) == (
+        "True,tensorflow\n",
+        "heard\nagain",
+        0,
+    )
 
 
 @pytest.mark.slow
@@ -35,12 +47,19 @@ REFUSED = "from enhsim_tf.common.errors import InputError\ntry:\n    import enhs
 
 
 def test_another_backend_of_keras_is_refused():
-    assert run(REFUSED, KERAS_BACKEND="jax").stdout.startswith("Expected KERAS_BACKEND tensorflow. Received: jax.")
+    assert run(REFUSED, KERAS_BACKEND="jax").stdout.startswith(
+        "Expected KERAS_BACKEND tensorflow. Received: jax."
+    )
 
 
 @pytest.mark.slow
 def test_tensorflow_that_runs_already_keeps_its_settings():
-    code = "import tensorflow\nimport os\nbefore = dict(os.environ)\n" + START + "print(dict(os.environ) == before)\n" + STATE
+    code = (
+        "import tensorflow\nimport os\nbefore = dict(os.environ)\n"
+        + START
+        + "print(dict(os.environ) == before)\n"
+        + STATE
+    )
     assert run(code, TF_ENABLE_ONEDNN_OPTS="0").stdout == "True\nFalse,tensorflow\n"
 
 
@@ -63,6 +82,8 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before < 5 * 100)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the allocator of glibc")
-@pytest.mark.parametrize(("environment", "kept"), [({}, "True"), ({"MALLOC_MMAP_MAX_": "65536"}, "False")])
+@pytest.mark.parametrize(
+    ("environment", "kept"), [({}, "True"), ({"MALLOC_MMAP_MAX_": "65536"}, "False")]
+)
 def test_freed_memory_is_kept_unless_the_user_says_otherwise(environment, kept):
     assert run(FAULTS, **environment).stdout == f"{kept}\n"

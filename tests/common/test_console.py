@@ -16,29 +16,47 @@ from enhsim_tf.telemetry.series import Telemetry
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("encoding", "printed"), [("ascii", "Gr??e ?\n"), ("latin-1", "Größe ?\n"), ("utf-8", "Größe 漢\n")])
+@pytest.mark.parametrize(
+    ("encoding", "printed"),
+    [("ascii", "Gr??e ?\n"), ("latin-1", "Größe ?\n"), ("utf-8", "Größe 漢\n")],
+)
 def test_a_line_is_printed_at_once_in_the_characters_of_the_encoding(encoding, printed):
     script = "import os\nfrom enhsim_tf.common.console import tell\ntell('Größe 漢')\nos._exit(0)"  # os._exit discards unwritten output
-    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding})
+    ended = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=ROOT,
+        capture_output=True,
+        env=os.environ | {"PYTHONIOENCODING": encoding},
+    )
     assert (ended.stdout.decode(encoding), ended.stderr) == (printed, b"")
 
 
 def test_a_loop_tells_how_far_it_is_at_most_every_fifteen_seconds():
     now, told = [1_000.0], []
     progress = Progress(told.append, "second ", clock=lambda: now[0])
-    for unit, total, steps, seconds in (("epoch", 2, [1, 1.5], 8), ("iteration", 10, range(1, 11), 2)):  # the interval spans the loops
+    for unit, total, steps, seconds in (
+        ("epoch", 2, [1, 1.5], 8),
+        ("iteration", 10, range(1, 11), 2),
+    ):  # the interval spans the loops
         loop = progress.loop(unit, total)
         for done in steps:
             now[0] += seconds
             loop(done)
-    assert told == ["second epoch 2 of 2, 75 %, about 5 s left", "second iteration 8 of 10, 80 %, about 4 s left"]
+    assert told == [
+        "second epoch 2 of 2, 75 %, about 5 s left",
+        "second iteration 8 of 10, 80 %, about 4 s left",
+    ]
 
 
 def test_a_fit_names_its_steps_where_it_is_asked_to(capsys):
     rng, told = np.random.default_rng(0), []
-    telemetry = Telemetry((np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)).astype(np.float32))
+    telemetry = Telemetry(
+        (np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)).astype(np.float32)
+    )
     options = FitOptions(window=60, num_windows=60, enhancer="ridge", noise="residual windows")
     for progress in (SILENT, Progress(told.append, "volts: ")):
         fit(telemetry, options=options, progress=progress)
         assert capsys.readouterr() == ("", ""), "its lines go where they were asked for"
-    assert told == [f"volts: {step} ..." for step in ("enhancer coarse", "enhancer ridge", "noise", "detectors")]
+    assert told == [
+        f"volts: {step} ..." for step in ("enhancer coarse", "enhancer ridge", "noise", "detectors")
+    ]

@@ -6,7 +6,12 @@ import pytest
 import tensorflow as tf
 
 from enhsim_tf.common import fast_keras
-from enhsim_tf.common.fast_keras import convolution_maximum, fused_adam, is_wide_dense_stack, with_fast_convolution
+from enhsim_tf.common.fast_keras import (
+    convolution_maximum,
+    fused_adam,
+    is_wide_dense_stack,
+    with_fast_convolution,
+)
 from enhsim_tf.paper import noise as of_paper
 from studies.common.training import dense_stack, fit_windows
 from tests.paper.conftest import tiny_settings
@@ -16,7 +21,9 @@ RNG = np.random.default_rng
 
 def test_fused_adam_moves_the_weights_as_adam_does():
     start, rng = np.linspace(-1, 1, 50).astype(np.float32), RNG(1)
-    gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(np.float32)  # from far below epsilon upwards
+    gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(
+        np.float32
+    )  # from far below epsilon upwards
     moved = []
     for optimizer in (fused_adam(0.01), keras.optimizers.Adam(0.01)):
         weight = keras.Variable(start)
@@ -39,8 +46,13 @@ def small_enhancer():
     return dense_stack(WINDOW, (WINDOW, UNITS, UNITS, WINDOW), seed=4, name="enhancer")
 
 
-@pytest.mark.parametrize("rows", [3, 13, 400])  # of a block; none divides the 20 rows of the widest kernel, and 400 are no block
-@pytest.mark.parametrize(("batch_size", "rate"), [(20, lambda: keras.optimizers.schedules.CosineDecay(0.003, 20)), (33, lambda: 0.001)])
+@pytest.mark.parametrize(
+    "rows", [3, 13, 400]
+)  # of a block; none divides the 20 rows of the widest kernel, and 400 are no block
+@pytest.mark.parametrize(
+    ("batch_size", "rate"),
+    [(20, lambda: keras.optimizers.schedules.CosineDecay(0.003, 20)), (33, lambda: 0.001)],
+)
 def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
     monkeypatch.setattr(fast_keras, "BLOCK_BYTES", 4 * UNITS * rows)
     network, again, plain = small_enhancer(), small_enhancer(), small_enhancer()
@@ -51,9 +63,13 @@ def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
     orders, losses = RNG(3), []
     for _ in range(3):
         order = orders.permutation(len(SOURCE))
-        losses += plain.fit(SOURCE[order], TARGET[order], batch_size, verbose=0, shuffle=False).history["loss"]
+        losses += plain.fit(
+            SOURCE[order], TARGET[order], batch_size, verbose=0, shuffle=False
+        ).history["loss"]
     np.testing.assert_allclose(found, losses, rtol=3e-6)
-    for weight, same, of_plain in zip(network.get_weights(), again.get_weights(), plain.get_weights(), strict=True):
+    for weight, same, of_plain in zip(
+        network.get_weights(), again.get_weights(), plain.get_weights(), strict=True
+    ):
         np.testing.assert_array_equal(weight, same)
         np.testing.assert_allclose(weight, of_plain, atol=5e-6)
     assert np.abs(network.get_weights()[0] - small_enhancer().get_weights()[0]).max() > 1e-3
@@ -95,8 +111,12 @@ def of_keras(stride, kept=None, rate=0.0):
     """Conv1D, Dropout with a given mask, and GlobalMaxPooling1D."""
 
     def compute(rows, kernel, bias):
-        products = tf.nn.relu(tf.nn.conv1d(rows[:, :, None], kernel[:, None], stride, "VALID") + bias)
-        return tf.reduce_max(products if kept is None else tf.where(kept, products / (1 - rate), 0.0), axis=1)
+        products = tf.nn.relu(
+            tf.nn.conv1d(rows[:, :, None], kernel[:, None], stride, "VALID") + bias
+        )
+        return tf.reduce_max(
+            products if kept is None else tf.where(kept, products / (1 - rate), 0.0), axis=1
+        )
 
     return compute
 
@@ -140,13 +160,25 @@ def test_a_convolution_by_hand():
 def test_values_and_gradients_are_those_of_keras(shape, has_ties):
     num_rows, samples, width, stride, filters = shape
     # rows and kernels of -1, 0 and 1: many frames give the same maximum, to the bit in any order of summation
-    draw = (lambda *size: RNG(len(size)).integers(-1, 2, size)) if has_ties else (lambda *size: RNG(len(size)).normal(size=size))
-    outputs, *_ = compare((draw(num_rows, samples), draw(width, filters), draw(filters)), fast_of(stride), of_keras(stride))
+    draw = (
+        (lambda *size: RNG(len(size)).integers(-1, 2, size))
+        if has_ties
+        else (lambda *size: RNG(len(size)).normal(size=size))
+    )
+    outputs, *_ = compare(
+        (draw(num_rows, samples), draw(width, filters), draw(filters)),
+        fast_of(stride),
+        of_keras(stride),
+    )
     assert outputs.any()
 
 
 @pytest.mark.parametrize(
-    "inputs", [(np.ones((3, 60)), np.ones((20, 4)), np.full(4, -100)), (np.zeros((2, 40)), np.ones((20, 3)), np.zeros(3))]
+    "inputs",
+    [
+        (np.ones((3, 60)), np.ones((20, 4)), np.full(4, -100)),
+        (np.zeros((2, 40)), np.ones((20, 3)), np.zeros(3)),
+    ],
 )
 def test_what_does_not_fire_passes_no_gradient(inputs):
     assert not any(array.any() for array in compare(inputs, fast_of(4), of_keras(4)))
@@ -156,7 +188,10 @@ def test_what_does_not_fire_passes_no_gradient(inputs):
 def test_gradients_with_dropped_products(rate):
     rng, seed = RNG(0), tf.constant([3, 4])
     shapes = [tf.TensorShape((number, 11, 14)) for number in (10, 10, 3)]
-    kept = [fast_keras._kept(shape, rate, each) for shape, each in zip(shapes, tf.unstack(tf.random.split(seed, 3)), strict=True)]
+    kept = [
+        fast_keras._kept(shape, rate, each)
+        for shape, each in zip(shapes, tf.unstack(tf.random.split(seed, 3)), strict=True)
+    ]
     kept = tf.concat(kept, axis=0)
     assert np.mean(kept) == pytest.approx(1 - rate, abs=0.05)
     inputs = [rng.normal(0, 0.3, size) for size in ((23, 63), (20, 14), 14)]
@@ -164,14 +199,20 @@ def test_gradients_with_dropped_products(rate):
 
 
 def small_discriminator(**changed):
-    return of_paper.build_discriminator(tiny_settings(window=63, filters=14, narrow_units=5, **changed))
+    return of_paper.build_discriminator(
+        tiny_settings(window=63, filters=14, narrow_units=5, **changed)
+    )
 
 
 def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
     rows, trained = tf.constant(RNG(0).normal(0, 0.1, (16, 63, 1)), tf.float32), []
     for _ in range(2):
-        settings = tiny_settings(window=63, filters=14, narrow_units=5, dropout=0.3, rows=16, fast=True)
-        gan = of_paper.NoiseGAN(of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings)
+        settings = tiny_settings(
+            window=63, filters=14, narrow_units=5, dropout=0.3, rows=16, fast=True
+        )
+        gan = of_paper.NoiseGAN(
+            of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings
+        )
         gan.compile()
         convolution, *_, narrow, _ = gan.discriminator.layers
         drops = [layer.seed_generator.state for layer in (convolution.dropout, narrow)]
@@ -183,7 +224,10 @@ def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize(("changed", "kinds"), [({"dropout": 0}, 3), ({"dropout": 0.3}, 4), ({"dropout": 0.3, "stride": 3}, 6)])
+@pytest.mark.parametrize(
+    ("changed", "kinds"),
+    [({"dropout": 0}, 3), ({"dropout": 0.3}, 4), ({"dropout": 0.3, "stride": 3}, 6)],
+)
 def test_a_width_that_is_no_multiple_of_the_stride_is_left_to_keras(changed, kinds):
     model = small_discriminator(**changed)
     fast, rows = with_fast_convolution(model), RNG(0).normal(size=(4, 63, 1)).astype(np.float32)

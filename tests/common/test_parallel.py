@@ -13,9 +13,19 @@ import pytest
 
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from tests.small_data_set import PlainMaker, die_at_thirteen, meet, plan, refuse, threads_and_square, threads_of
+from tests.small_data_set import (
+    PlainMaker,
+    die_at_thirteen,
+    meet,
+    plan,
+    refuse,
+    threads_and_square,
+    threads_of,
+)
 
-with_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
+with_ray = pytest.mark.skipif(
+    importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed"
+)
 
 
 def test_every_item_is_computed_once_in_single_threaded_processes():
@@ -66,15 +76,28 @@ def test_an_input_error_of_the_work_is_raised_unchanged(refused):
 
 
 def test_numbers_of_workers_are_parsed(refused):
-    assert [engines.parse_workers(text) for text in (None, "auto", "1", "512")] == [None, None, 1, 512]
-    for text, engine in (("0", None), ("513", "local"), ("many", None), ("-1", "ray"), ("1000000", "ray")):
+    assert [engines.parse_workers(text) for text in (None, "auto", "1", "512")] == [
+        None,
+        None,
+        1,
+        512,
+    ]
+    for text, engine in (
+        ("0", None),
+        ("513", "local"),
+        ("many", None),
+        ("-1", "ray"),
+        ("1000000", "ray"),
+    ):
         with refused("--workers"):
             engines.parse_workers(text, engine)
 
 
 def test_without_items_no_process_is_started(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    assert list(engines.run("local", refuse, [], 2)) == list(engines.run("ray", refuse, [], 2)) == []
+    assert (
+        list(engines.run("local", refuse, [], 2)) == list(engines.run("ray", refuse, [], 2)) == []
+    )
     assert not multiprocessing.active_children()
 
 
@@ -91,7 +114,9 @@ def test_ray_gives_the_same_results_and_replaces_killed_processes(tmp_path, monk
 
     from enhsim_tf.common.parallel.ray import _cluster
 
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # so that processes can import the work
+    monkeypatch.setenv(
+        "PYTHONPATH", str(Path(__file__).parents[2])
+    )  # so that processes can import the work
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
     with _cluster():  # one cluster for all checks, since starting one takes as long as the rest
         running, found = engines.run("ray", threads_and_square, range(60), 2), []
@@ -102,7 +127,10 @@ def test_ray_gives_the_same_results_and_replaces_killed_processes(tmp_path, monk
                 os.kill(done[1], signal.SIGKILL)
         assert sorted(found) == [number**2 for number in range(60)]
         (tmp_path / "met").mkdir()
-        running, found = engines.run("ray", functools.partial(meet, tmp_path / "met", 8), range(60), 8), []
+        running, found = (
+            engines.run("ray", functools.partial(meet, tmp_path / "met", 8), range(60), 8),
+            [],
+        )
         for done in running:
             found.append(done)
             if len(found) == 1:  # all eight at once, as when a node is lost with all its processes
@@ -115,14 +143,20 @@ def test_ray_gives_the_same_results_and_replaces_killed_processes(tmp_path, monk
         with refused("died in a row"):
             list(engines.run("ray", die_at_thirteen, [13], 1))
         asked = plan(150, 50)
-        records = list(engines.run("ray", PlainMaker(asked, tmp_path), range(3), 3))  # on two cores: more processes than CPUs
+        records = list(
+            engines.run("ray", PlainMaker(asked, tmp_path), range(3), 3)
+        )  # on two cores: more processes than CPUs
         (tmp_path / "here").mkdir()
-        assert sorted(records) == [PlainMaker(asked, tmp_path / "here")(shard) for shard in range(3)]
+        assert sorted(records) == [
+            PlainMaker(asked, tmp_path / "here")(shard) for shard in range(3)
+        ]
     assert not ray.is_initialized()
 
 
 @with_ray
-@pytest.mark.parametrize("error", [Exception("The current node\ntimed out"), OSError(28, "timed out")])
+@pytest.mark.parametrize(
+    "error", [Exception("The current node\ntimed out"), OSError(28, "timed out")]
+)
 def test_a_cluster_that_does_not_start_raises_one_line(error, monkeypatch, refused):
     import ray
 

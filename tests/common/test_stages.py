@@ -43,16 +43,24 @@ def work(tmp_path):
 def test_a_stage_is_done_once_and_found_again_by_the_values_of_its_settings(work):
     first, cached = work.run(settings=make_settings("smoke", seed=1))
     assert not cached and first.parent == work.cache and (first / "result.txt").read_text() == "1"
-    assert work.run(settings=make_settings("smoke", seed=1)) == (first, True) and work.made == 1  # other objects, as in a second run
-    assert [line.split()[0] for line in work.told] == ["work"] * 3 and work.told[-1].endswith("(from the cache)")
+    assert (
+        work.run(settings=make_settings("smoke", seed=1)) == (first, True) and work.made == 1
+    )  # other objects, as in a second run
+    assert [line.split()[0] for line in work.told] == ["work"] * 3 and work.told[-1].endswith(
+        "(from the cache)"
+    )
 
 
 def test_the_key_of_known_settings_stays(work, monkeypatch):
     monkeypatch.setattr(stages, "VERSIONS", {"keras": "1"})
-    assert work.run()[0].name == "work-6979b3ccab4bfff6", "another key would do all stages of former runs again"
+    assert work.run()[0].name == "work-6979b3ccab4bfff6", (
+        "another key would do all stages of former runs again"
+    )
 
 
-@pytest.mark.parametrize("changed", [{"settings": ("a", 2)}, {"name": "other"}, {"version": 2}, {"before": "two"}, {}])
+@pytest.mark.parametrize(
+    "changed", [{"settings": ("a", 2)}, {"name": "other"}, {"version": 2}, {"before": "two"}, {}]
+)
 def test_a_changed_dependence_does_it_anew(work, changed, monkeypatch):
     first, _ = work.run(before="one")
     if not changed:
@@ -97,7 +105,9 @@ DAMAGES = {
     "a missing file": lambda folder: (folder / "result.txt").unlink(),
     "a file of something else": lambda folder: (folder / "arrays.npz").touch(),
     "no stage.json": lambda folder: (folder / "stage.json").unlink(),
-    "an older stage.json": lambda folder: (folder / "stage.json").write_text('{"stage": "work", "seconds": 1}'),
+    "an older stage.json": lambda folder: (folder / "stage.json").write_text(
+        '{"stage": "work", "seconds": 1}'
+    ),
     "a file in its place": lambda folder: (shutil.rmtree(folder), folder.write_text("x")),
 }
 
@@ -107,7 +117,9 @@ def test_a_damaged_stage_is_told_and_done_again(work, damage):
     folder, _ = work.run()
     DAMAGES[damage](folder)
     assert work.run() == (folder, False) and work.run() == (folder, True) and work.made == 2
-    assert [line for line in work.told if "damaged in the cache" in line] == ["work         damaged in the cache; it is done again"]
+    assert [line for line in work.told if "damaged in the cache" in line] == [
+        "work         damaged in the cache; it is done again"
+    ]
     assert [path.name for path in folder.parent.iterdir()] == [folder.name]
 
 
@@ -121,23 +133,33 @@ def test_of_two_runs_at_once_the_first_keeps_its_place(work):
 
     first = []
     folder = Stages(work.cache, tell=lambda line: None).run("work", make, ())
-    assert first[1] == (folder, os.stat(folder).st_ino), "what another run may be reading was put away"
+    assert first[1] == (folder, os.stat(folder).st_ino), (
+        "what another run may be reading was put away"
+    )
     assert [path.name for path in work.cache.iterdir()] == [folder.name]
 
 
 def test_what_a_killed_run_left_is_cleared_away_by_the_next(work):
     folder, _ = work.run()
     with replace_folder(folder.with_name("killed")) as temporary:
-        shutil.copytree(temporary, half := temporary.with_name(temporary.name.replace("killed", "work")))
+        shutil.copytree(
+            temporary, half := temporary.with_name(temporary.name.replace("killed", "work"))
+        )
     assert half.is_dir()
     assert work.run() == (folder, True) and not half.exists()
 
 
 def test_arrays_come_back_as_they_went(tmp_path):
-    arrays = {"times": np.array(["2020-01-01T00:00:00.123"], "datetime64[ms]"), "names": np.array(["stuck"]), "empty": np.zeros((0, 3))}
+    arrays = {
+        "times": np.array(["2020-01-01T00:00:00.123"], "datetime64[ms]"),
+        "names": np.array(["stuck"]),
+        "empty": np.zeros((0, 3)),
+    }
     save_arrays(tmp_path, arrays | {"number": 0.1}, "those")
     found = load_arrays(tmp_path, "those")
-    assert set(found) == {*arrays, "number"} and found["number"].shape == () and found["number"] == 0.1
+    assert (
+        set(found) == {*arrays, "number"} and found["number"].shape == () and found["number"] == 0.1
+    )
     for key, array in arrays.items():
         assert found[key].dtype == array.dtype and np.array_equal(found[key], array)
 

@@ -92,12 +92,16 @@ def flip(path):
 
 
 @pytest.mark.parametrize(("damage", "damaged"), [(None, []), (Path.unlink, [3, 7]), (flip, [3, 7])])
-def test_damaged_and_missing_shards_are_found_and_generated_again(damage, damaged, undisturbed, tmp_path, here):
+def test_damaged_and_missing_shards_are_found_and_generated_again(
+    damage, damaged, undisturbed, tmp_path, here
+):
     folder = copy_of(undisturbed, tmp_path / "set")
     for shard in damaged:
         damage(folder / shard_file(shard))
     assert [line.split(":")[0] for line in find_problems(folder)] == list(map(shard_file, damaged))
-    assert told(folder, plan())[0].startswith(f"{20 - len(damaged)} of 20 shards") and here == damaged
+    assert (
+        told(folder, plan())[0].startswith(f"{20 - len(damaged)} of 20 shards") and here == damaged
+    )
     assert content_of(folder) == content_of(undisturbed) and not list(find_problems(folder))
 
 
@@ -116,7 +120,9 @@ def test_a_run_resumes_after_the_finished_shards(undisturbed, tmp_path, here):
     PlainMaker(plan(130), folder)(2)  # of the same one, but shorter
     (folder / shard_file(3)).write_bytes((folder / shard_file(5)).read_bytes()[:-9])
     (folder / shard_file(4)).write_bytes(b"")
-    assert list(find_problems(folder)) == ["not finished: 6 of 20 shards are there; run the same `generate` again"]
+    assert list(find_problems(folder)) == [
+        "not finished: 6 of 20 shards are there; run the same `generate` again"
+    ]
     assert told(folder, plan())[0].startswith("2 of 20 shards")
     assert here == [shard for shard in range(20) if shard not in (0, 5)]
     assert content_of(folder) == content_of(undisturbed)
@@ -124,11 +130,19 @@ def test_a_run_resumes_after_the_finished_shards(undisturbed, tmp_path, here):
 
 def test_a_long_run_says_how_far_it_is(tmp_path, monkeypatch, here):
     monkeypatch.setattr(console, "INTERVAL_S", 0.0)
-    assert any(line.startswith("window 500 of 1,000, 50 %, about ") for line in told(tmp_path / "set", plan()))
+    assert any(
+        line.startswith("window 500 of 1,000, 50 %, about ")
+        for line in told(tmp_path / "set", plan())
+    )
 
 
-@pytest.mark.parametrize("content", [b"{", b"[]", b"\xff", b'{"format": "enhsim_tf.datasets.generate/5", "settings": {}}'])
-def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
+@pytest.mark.parametrize(
+    "content",
+    [b"{", b"[]", b"\xff", b'{"format": "enhsim_tf.datasets.generate/5", "settings": {}}'],
+)
+def test_a_damaged_manifest_gives_one_line_with_advice(
+    content, undisturbed, tmp_path, here, refused
+):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)
     for call in (lambda: generate_data_set(folder, plan()), lambda: list(find_problems(folder))):
@@ -138,7 +152,9 @@ def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp
 
 
 def test_a_shard_written_to_the_disk_of_another_machine_is_an_error(tmp_path, monkeypatch, refused):
-    monkeypatch.setattr(generate.engines, "run", lambda *arguments: (each for each in [(3, "0" * 64)]))
+    monkeypatch.setattr(
+        generate.engines, "run", lambda *arguments: (each for each in [(3, "0" * 64)])
+    )
     with refused(shard_file(3), "all machines share"):
         generate_data_set(tmp_path / "set", plan())
 
@@ -169,7 +185,9 @@ def test_a_folder_is_held_against_the_same_process_too_and_let_go_of(tmp_path, r
     ],
     ids=["seed", "windows", "shard", "nominal", "scenarios", "model"],
 )
-def test_a_data_set_with_other_settings_is_left_unchanged(other, words, undisturbed, tmp_path, here, refused):
+def test_a_data_set_with_other_settings_is_left_unchanged(
+    other, words, undisturbed, tmp_path, here, refused
+):
     folder = begun(tmp_path / "set", undisturbed)
     before = content_of(folder)
     with refused(*words, "--out"):
@@ -196,7 +214,11 @@ def test_verify_names_unexpected_files(undisturbed, tmp_path):
 
 def started(folder, *options, **how):
     return subprocess.Popen(
-        [sys.executable, COMMAND, folder, *map(str, options)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how
+        [sys.executable, COMMAND, folder, *map(str, options)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **how,
     )
 
 
@@ -206,21 +228,33 @@ def children_of(process):
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = stat.read_text().rpartition(")")[2].split()
-            if int(fields[1]) == process.pid and b"spawn_main" in (stat.parent / "cmdline").read_bytes():
+            if (
+                int(fields[1]) == process.pid
+                and b"spawn_main" in (stat.parent / "cmdline").read_bytes()
+            ):
                 found.append(int(stat.parent.name))
         except OSError:  # the process has ended in the meantime
             continue
     return found
 
 
-linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+linux = pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(), reason="looks for processes in /proc"
+)
 
 
-FAULTS = [(who, seed) for who in ("driver", "worker", "interrupt") for seed in range(20 if who != "interrupt" else 3)]
+FAULTS = [
+    (who, seed)
+    for who in ("driver", "worker", "interrupt")
+    for seed in range(20 if who != "interrupt" else 3)
+]
 
 
 @linux
-@pytest.mark.parametrize(("who", "seed"), [pytest.param(*each, marks=[pytest.mark.slow] * (each != ("driver", 0))) for each in FAULTS])
+@pytest.mark.parametrize(
+    ("who", "seed"),
+    [pytest.param(*each, marks=[pytest.mark.slow] * (each != ("driver", 0))) for each in FAULTS],
+)
 def test_killed_and_interrupted_runs_are_recovered_bit_for_bit(who, seed, undisturbed, tmp_path):
     folder, rng = tmp_path / "set", np.random.default_rng(seed)
     folder.mkdir()
@@ -236,31 +270,46 @@ def test_killed_and_interrupted_runs_are_recovered_bit_for_bit(who, seed, undist
     err = process.communicate()[1]
     assert process.returncode == {"driver": -signal.SIGKILL, "worker": 0, "interrupt": 130}[who]
     if who == "interrupt":
-        assert err == "interrupted; what was finished is kept\n" and not [name for name in os.listdir(folder) if name.startswith(".shard")]
+        assert err == "interrupted; what was finished is kept\n" and not [
+            name for name in os.listdir(folder) if name.startswith(".shard")
+        ]
     if who != "worker":
         again = started(folder)  # the workers of the killed driver may still be running
         again.communicate()
         assert again.returncode == 0
     assert content_of(folder) == content_of(undisturbed)
     deadline = time.monotonic() + 20
-    while any(Path(f"/proc/{worker}").exists() for worker in workers) and time.monotonic() < deadline:
+    while (
+        any(Path(f"/proc/{worker}").exists() for worker in workers) and time.monotonic() < deadline
+    ):
         time.sleep(0.05)
-    assert not [worker for worker in workers if Path(f"/proc/{worker}").exists()], "a worker of the killed driver is still running"
+    assert not [worker for worker in workers if Path(f"/proc/{worker}").exists()], (
+        "a worker of the killed driver is still running"
+    )
 
 
 @pytest.mark.slow
 def test_a_full_disk_gives_one_line_and_a_later_run_finishes(undisturbed, tmp_path):
     folder = tmp_path / "set"
-    process = started(folder, "--limit", 9_000)  # limits the size of files, which for a program looks like a full disk
+    process = started(
+        folder, "--limit", 9_000
+    )  # limits the size of files, which for a program looks like a full disk
     out, err = process.communicate()
-    assert process.returncode == 2 and err.startswith("error: Expected ") and len(err.splitlines()) == 1 and "large" in err
+    assert (
+        process.returncode == 2
+        and err.startswith("error: Expected ")
+        and len(err.splitlines()) == 1
+        and "large" in err
+    )
     assert not [name for name in os.listdir(folder) if "shard" in name]
     assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
 
 
 def test_a_read_only_folder_gives_one_line():
     as_another = ["--user", 65534] if os.geteuid() == 0 else []  # root may write anywhere
-    with tempfile.TemporaryDirectory() as outer:  # other users may enter this folder, unlike `tmp_path`
+    with (
+        tempfile.TemporaryDirectory() as outer
+    ):  # other users may enter this folder, unlike `tmp_path`
         folder = Path(outer) / "set"
         folder.mkdir()
         folder.chmod(0o555)
@@ -268,7 +317,11 @@ def test_a_read_only_folder_gives_one_line():
         process = started(folder, *as_another)
         out, err = process.communicate()
         assert (process.returncode, out, os.listdir(folder)) == (2, "", [])
-        assert err.startswith("error: Expected ") and "Permission denied" in err and len(err.splitlines()) == 1
+        assert (
+            err.startswith("error: Expected ")
+            and "Permission denied" in err
+            and len(err.splitlines()) == 1
+        )
         folder.chmod(0o755)
 
 
@@ -293,35 +346,83 @@ def models(tmp_path_factory):
 def serially(folder, model, windows, scenarios, monkeypatch):
     """Generates a data set of a saved simulator with the seed 5 in this process."""
     monkeypatch.setattr(generate.engines, "run", serial)
-    generate_data_set(folder, make_plan(EnhancedSimulator.load(model), model, scenarios, 0.5, windows, 5), tell=lambda line: None)
+    generate_data_set(
+        folder,
+        make_plan(EnhancedSimulator.load(model), model, scenarios, 0.5, windows, 5),
+        tell=lambda line: None,
+    )
     return folder
 
 
 def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(labelled_windows, "_SHARD", 50)
-    asked = ["generate", str(models / "volts"), "--windows", "150", "--scenario", "friction:0-1", "--seed", "5"]
+    asked = [
+        "generate",
+        str(models / "volts"),
+        "--windows",
+        "150",
+        "--scenario",
+        "friction:0-1",
+        "--seed",
+        "5",
+    ]
     assert main([*asked, "--workers", "2", "--out", str(tmp_path / "set")]) == 0
     assert "volts: 150 windows of 60 samples in 3 shards in " in capsys.readouterr().out
-    expected = serially(tmp_path / "serial", models / "volts", 150, [ScenarioRange("friction", (0.0, 1.0))], monkeypatch)
+    expected = serially(
+        tmp_path / "serial",
+        models / "volts",
+        150,
+        [ScenarioRange("friction", (0.0, 1.0))],
+        monkeypatch,
+    )
     assert content_of(tmp_path / "set") == content_of(expected)
-    assert main(["verify", str(tmp_path / "set")]) == 0 and capsys.readouterr().out == "150 windows in 3 shards, all intact\n"
+    assert (
+        main(["verify", str(tmp_path / "set")]) == 0
+        and capsys.readouterr().out == "150 windows in 3 shards, all intact\n"
+    )
     assert main([*asked, "--out", str(tmp_path / "one.parquet")]) == 0
-    one, parts = pd.read_parquet(tmp_path / "one.parquet"), pd.read_parquet(sorted(expected.glob("shard-*.parquet")))
-    np.testing.assert_allclose(np.stack(one.pop("window")), np.stack(parts.pop("window")), atol=1e-6)  # other threads may round otherwise
+    one, parts = (
+        pd.read_parquet(tmp_path / "one.parquet"),
+        pd.read_parquet(sorted(expected.glob("shard-*.parquet"))),
+    )
+    np.testing.assert_allclose(
+        np.stack(one.pop("window")), np.stack(parts.pop("window")), atol=1e-6
+    )  # other threads may round otherwise
     pd.testing.assert_frame_equal(one, parts)
 
 
 @pytest.mark.slow
 def test_a_run_goes_on_when_a_machine_of_its_cluster_is_lost(models, tmp_path, monkeypatch):
-    cluster_utils = pytest.importorskip("ray.cluster_utils", reason="the optional extra ray is not installed")
+    cluster_utils = pytest.importorskip(
+        "ray.cluster_utils", reason="the optional extra ray is not installed"
+    )
     monkeypatch.setattr(labelled_windows, "_SHARD", 50)
     script = "import sys\nfrom enhsim_tf.__main__ import main\nfrom enhsim_tf.datasets import labelled_windows\nlabelled_windows._SHARD = 50\nsys.exit(main())"
-    command = [sys.executable, "-c", script, "generate", models / "volts", "--windows", "6000", "--seed", "5", "--engine", "ray"]
-    cluster = cluster_utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    command = [
+        sys.executable,
+        "-c",
+        script,
+        "generate",
+        models / "volts",
+        "--windows",
+        "6000",
+        "--seed",
+        "5",
+        "--engine",
+        "ray",
+    ]
+    cluster = cluster_utils.Cluster(
+        initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False}
+    )
     try:
         node = cluster.add_node(num_cpus=1)
         environment = os.environ | {"RAY_ADDRESS": cluster.address, "PYTHONPATH": str(ROOT)}
-        process = subprocess.Popen([*command, "--out", tmp_path / "set"], env=environment, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [*command, "--out", tmp_path / "set"],
+            env=environment,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         while not list((tmp_path / "set").glob("shard-*")) and process.poll() is None:
             time.sleep(0.01)
         cluster.remove_node(node, allow_graceful=False)
@@ -329,13 +430,26 @@ def test_a_run_goes_on_when_a_machine_of_its_cluster_is_lost(models, tmp_path, m
         assert process.returncode == 0, error
     finally:
         cluster.shutdown()
-    assert content_of(tmp_path / "set") == content_of(serially(tmp_path / "serial", models / "volts", 6_000, [], monkeypatch))
+    assert content_of(tmp_path / "set") == content_of(
+        serially(tmp_path / "serial", models / "volts", 6_000, [], monkeypatch)
+    )
 
 
 def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(generate, "ShardMaker", PlainMaker)
     monkeypatch.setattr(generate.engines, "run", serial)
-    options = ["generate", str(models), "--windows", "1_000", "--workers", "auto", "--scenario", "stuck:0.5", "--seed", "4"]
+    options = [
+        "generate",
+        str(models),
+        "--windows",
+        "1_000",
+        "--workers",
+        "auto",
+        "--scenario",
+        "stuck:0.5",
+        "--seed",
+        "4",
+    ]
     assert main([*options, "--out", str(tmp_path / "both")]) == 0
     assert main([*options, "--channel", "volts", "--out", str(tmp_path / "one")]) == 0
     assert sorted(os.listdir(tmp_path / "both")) == ["amps", "volts"]
@@ -347,11 +461,19 @@ def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, c
 # reading
 
 
-DOCS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "large_data_sets.md").read_text(encoding="utf-8"), re.DOTALL)
+DOCS = re.findall(
+    r"```python\n(.*?)```",
+    (ROOT / "docs" / "large_data_sets.md").read_text(encoding="utf-8"),
+    re.DOTALL,
+)
 
 
-@pytest.mark.parametrize(("number", "library"), list(enumerate(("pandas", "pyarrow.dataset", "tensorflow"))))
-def test_the_reading_examples_of_the_documentation_return_the_data_set(number, library, undisturbed, monkeypatch):
+@pytest.mark.parametrize(
+    ("number", "library"), list(enumerate(("pandas", "pyarrow.dataset", "tensorflow")))
+)
+def test_the_reading_examples_of_the_documentation_return_the_data_set(
+    number, library, undisturbed, monkeypatch
+):
     monkeypatch.chdir(undisturbed.parent)
     code = DOCS[number].replace('"training"', '"set"')
     assert f"import {library}" in code and len(DOCS) == 3

@@ -24,39 +24,69 @@ def test_several_channels_have_columns_of_their_own(refused):
     both, drift = known(channels=("volts", "amps")), Degraded("drift", 1.0, 0.5, "amps")
     series = series_labelled(both, 300, drift, 4)
     assert list(series) == ["volts", "amps", *LABELS, "mask volts", "mask amps"]
-    np.testing.assert_array_equal(series["mask"], series["amps"] != both.generate_series(300, None, 4)[:, 1])
+    np.testing.assert_array_equal(
+        series["mask"], series["amps"] != both.generate_series(300, None, 4)[:, 1]
+    )
     with refused("volts, amps", "'watts'"):
         series_labelled(both, 300, Degraded("drift", 1.0, 0.5, "watts"))
 
 
-@pytest.mark.parametrize("scenario", [None, Degraded("dropout", 0.7, 0.3), Degraded("stuck", 0.0)], ids=str)
+@pytest.mark.parametrize(
+    "scenario", [None, Degraded("dropout", 0.7, 0.3), Degraded("stuck", 0.0)], ids=str
+)
 def test_a_series_equals_that_of_the_simulator(scenario):
     frame = series_labelled(known(), 1_234, scenario, 9)
     assert list(frame.columns) == ["value", *LABELS] and frame.index.name == "time_s"
     np.testing.assert_array_equal(frame["value"], known().generate_series(1_234, scenario, 9)[:, 0])
     np.testing.assert_array_equal(frame.index, 2.0 * np.arange(1_234))
-    mask = (known().generate_series(1_234, scenario, 9) != known().generate_series(1_234, None, 9))[:, 0]
-    assert mask.any() == bool(scenario and scenario.severity) and not mask[:370].any()  # 0.3 * 1234 = 370.2
+    mask = (known().generate_series(1_234, scenario, 9) != known().generate_series(1_234, None, 9))[
+        :, 0
+    ]
+    assert (
+        mask.any() == bool(scenario and scenario.severity) and not mask[:370].any()
+    )  # 0.3 * 1234 = 370.2
     np.testing.assert_array_equal(frame["mask"], mask)
     np.testing.assert_array_equal(frame["scenario"] == "dropout", mask)
     np.testing.assert_array_equal(frame["scenario"] == "nominal", ~mask)
     np.testing.assert_allclose(frame["severity"], np.where(mask, 0.7, 0), rtol=1e-6)
     for name, value in (("onset", mask.argmax()), ("end", 1_234 - mask[::-1].argmax())):
-        assert frame[name].isna().tolist() == (~mask).tolist() and (frame[name][mask] == value).all()
+        assert (
+            frame[name].isna().tolist() == (~mask).tolist() and (frame[name][mask] == value).all()
+        )
 
 
 def test_wrong_schedules_are_refused(refused):
     for begin, length in ((200, 50), (150, 10), (950, 51)):  # touching, overlapping, beyond the end
         with refused("drift"):
-            series_labelled(known(), 1_000, schedule=[PlacedEvent("stuck", 1.0, 100, 100), PlacedEvent("drift", 1.0, begin, length)])
-    for wrong in (("rust", 1.0, 0, 5), ("stuck", 2.0, 0, 5), ("stuck", 1.0, -1, 5), ("stuck", 1.0, 0, 0)):
+            series_labelled(
+                known(),
+                1_000,
+                schedule=[
+                    PlacedEvent("stuck", 1.0, 100, 100),
+                    PlacedEvent("drift", 1.0, begin, length),
+                ],
+            )
+    for wrong in (
+        ("rust", 1.0, 0, 5),
+        ("stuck", 2.0, 0, 5),
+        ("stuck", 1.0, -1, 5),
+        ("stuck", 1.0, 0, 0),
+    ):
         with refused():
             series_labelled(known(), 1_000, schedule=[PlacedEvent(*wrong)])
 
 
 def test_a_series_with_a_start_has_times():
-    frame = series_labelled(known(interval_s=0.1), 1_000, Degraded("stuck", 0.5, 0.5), 1, "2024-02-28T23:59:59")
-    assert isinstance(frame.index, pd.DatetimeIndex) and str(frame.index.tz) == "UTC" and frame.index.name == "time"
+    frame = series_labelled(
+        known(interval_s=0.1), 1_000, Degraded("stuck", 0.5, 0.5), 1, "2024-02-28T23:59:59"
+    )
+    assert (
+        isinstance(frame.index, pd.DatetimeIndex)
+        and str(frame.index.tz) == "UTC"
+        and frame.index.name == "time"
+    )
     expected = pd.date_range("2024-02-28T23:59:59", periods=1_000, freq="100ms", tz="UTC")
     assert (frame.index == expected).all()  # to the nanosecond
-    assert (frame["scenario"].iloc[:500] == "nominal").all() and (frame["scenario"].iloc[500:] == "stuck").any()
+    assert (frame["scenario"].iloc[:500] == "nominal").all() and (
+        frame["scenario"].iloc[500:] == "stuck"
+    ).any()

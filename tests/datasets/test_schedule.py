@@ -31,13 +31,20 @@ SIMULATOR = of_waves([COARSE], 64, interval_s=INTERVAL_S)
 def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
     given, rng = [PlacedEvent("gain_loss", 1.0, 500, 100)], np.random.default_rng(seed)
     schedule = draw_schedule(SIMULATOR, 3_000, given, MODES, 8, (10, 80), rng)
-    assert sorted(event.kind for event in schedule) == ["drift"] * 4 + ["gain_loss"] + ["stuck"] * 4 and given[0] in schedule
+    assert (
+        sorted(event.kind for event in schedule) == ["drift"] * 4 + ["gain_loss"] + ["stuck"] * 4
+        and given[0] in schedule
+    )
     for before, after in itertools.pairwise(schedule):
         assert after.begin - before.end >= 80
     drifts = [event.severity for event in schedule if event.kind == "drift"]
     assert len(set(drifts)) == 4 and 0.3 <= min(drifts) < max(drifts) <= 0.6
-    assert schedule[-1].end <= 3_000 and all(10 <= event.length <= 80 for event in schedule if event not in given)
-    events = [(Degraded(event.kind, event.severity, 0.0), event.begin, event.end) for event in schedule]
+    assert schedule[-1].end <= 3_000 and all(
+        10 <= event.length <= 80 for event in schedule if event not in given
+    )
+    events = [
+        (Degraded(event.kind, event.severity, 0.0), event.begin, event.end) for event in schedule
+    ]
     drawn = SIMULATOR.alignment.draw_series(3_000, events, np.random.default_rng(0))
     run, nominal = drawn.coarse[0, :, 0], drawn.nominal[0, :, 0]
     for event in schedule:
@@ -49,14 +56,27 @@ def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
 
 
 def test_the_same_seed_gives_the_same_schedule_and_changes_that_fade_do_not_meet():
-    first, again = (draw_schedule(SIMULATOR, 3_000, [], MODES, 8, (2, 2), np.random.default_rng(3)) for _ in range(2))
+    first, again = (
+        draw_schedule(SIMULATOR, 3_000, [], MODES, 8, (2, 2), np.random.default_rng(3))
+        for _ in range(2)
+    )
     assert first == again
-    assert min(after.begin - before.end for before, after in itertools.pairwise(first)) >= 9  # a fade is four samples long
+    assert (
+        min(after.begin - before.end for before, after in itertools.pairwise(first)) >= 9
+    )  # a fade is four samples long
 
 
 def test_events_that_change_nothing_or_do_not_fit_are_refused(refused):
     with refused("changes nothing at 100 drawn places"):
-        draw_schedule(SIMULATOR, 3_000, [], [ScenarioRange("drift", (0.0, 0.0))], 1, (10, 10), np.random.default_rng(0))
+        draw_schedule(
+            SIMULATOR,
+            3_000,
+            [],
+            [ScenarioRange("drift", (0.0, 0.0))],
+            1,
+            (10, 10),
+            np.random.default_rng(0),
+        )
     with refused("room for events"):
         draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), np.random.default_rng(0))
 
@@ -78,17 +98,33 @@ def test_scenarios_are_parsed(text, expected):
 
 
 def test_a_scenario_is_drawn_between_its_limits():
-    drawn = [parse_scenario("a=stuck:0.2-0.8:0.1-0.3").draw(rng) for rng in [np.random.default_rng(0)] for _ in range(2_000)]
-    for found, low, high in (([each.severity for each in drawn], 0.2, 0.8), ([each.onset for each in drawn], 0.1, 0.3)):
-        assert low <= min(found) and max(found) <= high and np.mean(found) == pytest.approx((low + high) / 2, abs=0.02 * (high - low) * 5)
+    drawn = [
+        parse_scenario("a=stuck:0.2-0.8:0.1-0.3").draw(rng)
+        for rng in [np.random.default_rng(0)]
+        for _ in range(2_000)
+    ]
+    for found, low, high in (
+        ([each.severity for each in drawn], 0.2, 0.8),
+        ([each.onset for each in drawn], 0.1, 0.3),
+    ):
+        assert (
+            low <= min(found)
+            and max(found) <= high
+            and np.mean(found) == pytest.approx((low + high) / 2, abs=0.02 * (high - low) * 5)
+        )
     assert {(each.mode, each.channel) for each in drawn} == {("stuck", "a")}
     assert parse_scenario("stuck:0.5").draw(np.random.default_rng(0)) == Degraded("stuck", 0.5)
 
 
 def test_places_are_parsed():
     assert parse_place("stuck:0.5@100/20") == Place("stuck", 0.5, "100", "20")
-    assert parse_place("stuck:inf@2024-01-05T12:00+02:00/2h") == Place("stuck", np.inf, "2024-01-05T12:00+02:00", "2h")
-    assert parse_place("drift@100/20").severity is None and parse_place("drift@100/20", 1.0).severity == 1.0
+    assert parse_place("stuck:inf@2024-01-05T12:00+02:00/2h") == Place(
+        "stuck", np.inf, "2024-01-05T12:00+02:00", "2h"
+    )
+    assert (
+        parse_place("drift@100/20").severity is None
+        and parse_place("drift@100/20", 1.0).severity == 1.0
+    )
     times = pd.date_range("2024-01-05T09:00", periods=1_000, freq="10s", tz="UTC")
     assert parse_place("stuck:1@2024-01-05T12:00+02:00/10min").samples(times, 10.0) == (360, 60)
     assert parse_place("stuck:1@7/10min").samples(pd.RangeIndex(9), 10.0) == (7, 60)
@@ -118,7 +154,10 @@ def test_lengths_out_of_range_for_the_interval_are_refused(refused, text, interv
 
 def test_limits_are_parsed(refused):
     assert length_limits(("10", "10min"), 30.0) == (10, 20)
-    assert split_limits("length", "5") == ("5", "5") and split_limits("length", "5:1h") == ("5", "1h")
+    assert split_limits("length", "5") == ("5", "5") and split_limits("length", "5:1h") == (
+        "5",
+        "1h",
+    )
     with refused("the least first"):
         length_limits(("20", "10"), 1.0)
 
@@ -126,13 +165,16 @@ def test_limits_are_parsed(refused):
 def test_start_times_are_converted_to_utc():
     assert parse_start("2024-01-01") == pd.Timestamp("2024-01-01", tz="UTC")
     assert parse_start("2024-06-01T12:00+02:00") == pd.Timestamp("2024-06-01T10:00", tz="UTC")
-    assert parse_start(pd.Timestamp("2024-06-01T12:00", tz="Europe/Berlin")) == pd.Timestamp("2024-06-01T10:00", tz="UTC")
+    assert parse_start(pd.Timestamp("2024-06-01T12:00", tz="Europe/Berlin")) == pd.Timestamp(
+        "2024-06-01T10:00", tz="UTC"
+    )
 
 
 WRONG = {
     parse_scenario: "|stuck|stuck:|stuck:half|stuck:0.5:|stuck:2|stuck:-0.1|stuck:nan|stuck:0.5:1|stuck:0.5:0.1:7|nominal:0.5|stuck:0.8-0.2"
     "|stuck:0.2-|stuck:0.1-0.2-0.3|stuck:0.2-2|stuck:0.5:0.5-1",
-    parse_length: "|0|-5|0s|-1d|nan|NaT|inf|long|1 fortnight|5000.5|1e3|²|1m|1d 6h|1.d|d|" + "9" * 5_000,
+    parse_length: "|0|-5|0s|-1d|nan|NaT|inf|long|1 fortnight|5000.5|1e3|²|1m|1d 6h|1.d|d|"
+    + "9" * 5_000,
     parse_start: "|soon|01.02.2024|1066-10-14|9999-01-01|2024-13-01",
     parse_place: "stuck|stuck@5|stuck:x@5/5|@5/5|stuck:1@5/long",
     lambda text: split_limits("length", text): "|:5|5:|1:2:3",

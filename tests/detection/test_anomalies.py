@@ -10,15 +10,25 @@ RAMP = np.arange(10, dtype=np.float32)
 
 def injected(window, kind, severity, duration, seed=0, noise_sd=0.5):
     """Injects an anomaly into one window, and returns the window and the anomalous positions."""
-    values, mask = inject(np.asarray(window)[None], kind, severity, duration, noise_sd, np.random.default_rng(seed))
-    assert values.dtype == np.float32 and mask.dtype == bool and values.shape == mask.shape == (1, len(window))
+    values, mask = inject(
+        np.asarray(window)[None], kind, severity, duration, noise_sd, np.random.default_rng(seed)
+    )
+    assert (
+        values.dtype == np.float32
+        and mask.dtype == bool
+        and values.shape == mask.shape == (1, len(window))
+    )
     return values[0], np.flatnonzero(mask[0])
 
 
 def waves(number=6, samples=300, seed=0):
     rng = np.random.default_rng(seed)
     phases = rng.uniform(0, 2 * np.pi, (number, 1))
-    return (5 + np.sin(2 * np.pi * np.arange(samples) / 120 + phases) + 0.1 * rng.standard_normal((number, samples))).astype(np.float32)
+    return (
+        5
+        + np.sin(2 * np.pi * np.arange(samples) / 120 + phases)
+        + 0.1 * rng.standard_normal((number, samples))
+    ).astype(np.float32)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +46,9 @@ def waves(number=6, samples=300, seed=0):
 def test_constant_window_by_hand(kind, changes):
     sides = set()
     for seed in range(8):
-        values, places = injected(np.full(10, 3.0), kind, 2, 4, seed)  # twice a noise of 0.5: off by 1
+        values, places = injected(
+            np.full(10, 3.0), kind, 2, 4, seed
+        )  # twice a noise of 0.5: off by 1
         change = values[places] - 3
         side = -1 if kind in ("level_shift", "ramp", "spike") and change[-1] < 0 else 1
         sides.add(side)
@@ -70,7 +82,11 @@ def test_gain_of_a_ramp_by_hand():
 
 def test_spikes_come_every_25_samples_of_the_range():
     values, places = injected(np.zeros(300), "spike", 2, 100, seed=1)
-    assert np.diff(places).tolist() == [25, 25, 25] and set(np.abs(values[places])) == {1} and len(set(values[places])) == 1
+    assert (
+        np.diff(places).tolist() == [25, 25, 25]
+        and set(np.abs(values[places])) == {1}
+        and len(set(values[places])) == 1
+    )
     assert np.count_nonzero(values) == 4
 
 
@@ -82,7 +98,9 @@ def test_the_deviation_of_added_noise_is_the_severity():
 
 def test_one_seed_gives_every_kind_and_severity_the_same_places():
     firsts = {
-        (kind, severity): inject(waves(), kind, severity, 25, 0.1, np.random.default_rng(7))[1].argmax(axis=1).tolist()
+        (kind, severity): inject(waves(), kind, severity, 25, 0.1, np.random.default_rng(7))[1]
+        .argmax(axis=1)
+        .tolist()
         for kind in INJECTIONS
         for severity in (0.5, 8)
     }
@@ -113,11 +131,18 @@ def test_what_is_refused(refused):
 def test_the_noise_of_a_smooth_signal_with_jumps_is_recovered(sd):
     rng, places = np.random.default_rng(1), np.arange(20_000)
     signal = 5 * np.sin(2 * np.pi * places / 300) + 10 * (places // 1_000 % 2)  # 19 jumps of 10
-    assert estimate_noise_sd([signal + sd * rng.standard_normal(20_000)]) == pytest.approx(sd, rel=0.03)
+    assert estimate_noise_sd([signal + sd * rng.standard_normal(20_000)]) == pytest.approx(
+        sd, rel=0.03
+    )
 
 
 def test_the_noise_of_few_levels_is_the_root_mean_square_of_second_differences():
     values = np.zeros(100)
     values[50] = 3.0  # second differences 3, -6, 3 among 98: (9 + 36 + 9) / 98 / 6
     assert estimate_noise_sd([values]) == pytest.approx(np.sqrt(54 / 98 / 6))
-    assert estimate_noise_sd([np.ones(100)]) == estimate_noise_sd([np.arange(100.0)]) == estimate_noise_sd([np.ones(2)]) == 0
+    assert (
+        estimate_noise_sd([np.ones(100)])
+        == estimate_noise_sd([np.arange(100.0)])
+        == estimate_noise_sd([np.ones(2)])
+        == 0
+    )

@@ -35,7 +35,11 @@ def waves(number, seed, noise_sd=0.1):
     """Sines of 40 samples at random phases, in noise, around 5, of shape `(windows, samples)`."""
     rng = np.random.default_rng(seed)
     phases = rng.uniform(0, 2 * np.pi, (number, 1))
-    return (5 + np.sin(2 * np.pi * np.arange(100) / 40 + phases) + noise_sd * rng.standard_normal((number, 100))).astype(np.float32)
+    return (
+        5
+        + np.sin(2 * np.pi * np.arange(100) / 40 + phases)
+        + noise_sd * rng.standard_normal((number, 100))
+    ).astype(np.float32)
 
 
 def one_channel(number, seed):
@@ -75,11 +79,15 @@ def test_same_seed_same_scores(name):
     training, windows = one_channel(120, 0), one_channel(20, 1)
     first, again, other = (DETECTORS[name](seed).fit(training).score(windows) for seed in (3, 3, 4))
     assert (first == again).all()
-    np.testing.assert_allclose(first, other, rtol=0.1)  # the PCA's solver is random, its components are not
+    np.testing.assert_allclose(
+        first, other, rtol=0.1
+    )  # the PCA's solver is random, its components are not
 
 
 def test_names_on_the_command_line_differ():
-    assert option_name("PCA residual") == "pca-residual" and len(set(map(option_name, DETECTORS))) == len(DETECTORS)
+    assert option_name("PCA residual") == "pca-residual" and len(
+        set(map(option_name, DETECTORS))
+    ) == len(DETECTORS)
 
 
 # several channels
@@ -89,7 +97,14 @@ def both_ways(number, seed, noise_sd=0.1):
     """Windows of two channels, of which the second is the first upside down; each has noise of its own."""
     first = waves(number, seed, noise_sd)
     return np.stack(
-        [first, 10 - first + noise_sd * np.random.default_rng([seed, 1]).standard_normal(first.shape).astype(np.float32)], axis=2
+        [
+            first,
+            10
+            - first
+            + noise_sd
+            * np.random.default_rng([seed, 1]).standard_normal(first.shape).astype(np.float32),
+        ],
+        axis=2,
     )
 
 
@@ -118,11 +133,18 @@ def test_innovations_of_a_known_vector_autoregression_are_white_and_those_of_ano
     fresh = vector_autoregression(300, 1)
     scores = detector.score(fresh)
     assert scores.mean() == pytest.approx(2, rel=0.02)  # one for each channel
-    assert scores.std() == pytest.approx(np.sqrt(2 * 2 / 118), rel=0.15)  # of a mean of 118 sums of two squares
-    swapped = np.stack([fresh[:, :, 0], np.roll(fresh[:, :, 1], 150, axis=0)], axis=2)  # every channel looks as before
+    assert scores.std() == pytest.approx(
+        np.sqrt(2 * 2 / 118), rel=0.15
+    )  # of a mean of 118 sums of two squares
+    swapped = np.stack(
+        [fresh[:, :, 0], np.roll(fresh[:, :, 1], 150, axis=0)], axis=2
+    )  # every channel looks as before
     late = np.stack([fresh[:, :, 0], np.roll(fresh[:, :, 1], 30, axis=1)], axis=2)
     for changed_relation in (swapped, late):
-        assert detector.score(changed_relation).mean() > 3 and area(detector.score(changed_relation), scores) > 0.999
+        assert (
+            detector.score(changed_relation).mean() > 3
+            and area(detector.score(changed_relation), scores) > 0.999
+        )
     assert area(LimitCheck().fit(fresh).score(swapped), LimitCheck().fit(fresh).score(fresh)) < 0.6
 
 
@@ -164,11 +186,15 @@ def test_pca_residual_is_the_energy_outside_the_span():
 def test_a_channel_that_leaves_the_others_is_far_although_its_values_are_usual():
     rng = np.random.default_rng(1)
     own = rng.standard_normal((200, 40, 3)) + [1.0, -2.0, 5.0]
-    assert JointMeans().fit(own).score(own).mean() == pytest.approx(199 / 200)  # a covariance times its inverse, of n - 1 in n
+    assert JointMeans().fit(own).score(own).mean() == pytest.approx(
+        199 / 200
+    )  # a covariance times its inverse, of n - 1 in n
     common = rng.standard_normal((2_000, 1, 1))
     windows = common + 0.1 * rng.standard_normal((2_000, 20, 2))
     apart = windows[:1].copy()
-    apart[:, :, 1] += 0.5  # half the deviation of the channel, twenty of the difference of two means
+    apart[:, :, 1] += (
+        0.5  # half the deviation of the channel, twenty of the difference of two means
+    )
     assert JointMeans().fit(windows).score(apart)[0] > 10
 
 
@@ -176,7 +202,9 @@ def test_both_a_short_change_and_a_lasting_one_are_far():
     rng = np.random.default_rng(2)
     windows = rng.standard_normal((4_000, 40, 2))
     short, lasting = windows[:500].copy(), windows[:500].copy()
-    short[:, 10:20, 0] += 1.6  # 5 deviations of the mean of a quarter, 2.5 of the mean of the window
+    short[:, 10:20, 0] += (
+        1.6  # 5 deviations of the mean of a quarter, 2.5 of the mean of the window
+    )
     lasting[:, :, 0] += 0.8  # 2.5 deviations of the mean of each quarter, 5 of that of the window
     detector = JointSize().fit(windows)
     for changed in (short, lasting):
@@ -188,7 +216,9 @@ def test_both_a_short_change_and_a_lasting_one_are_far():
 
 def sizes_of(sds, seed=0):
     """Sizes of windows of 100 samples of white noise with these standard deviations."""
-    return root_mean_square(np.asarray(sds)[:, None] * np.random.default_rng(seed).standard_normal((len(sds), 100)))
+    return root_mean_square(
+        np.asarray(sds)[:, None] * np.random.default_rng(seed).standard_normal((len(sds), 100))
+    )
 
 
 def test_the_factor_is_the_median_of_past_sizes_within_its_bounds():
@@ -205,6 +235,11 @@ def test_the_scale_follows_slow_drift_but_no_fault_beyond_the_bound():
     typical = np.median(sizes_of(np.ones(400)))
     threshold = np.quantile(following_drift(sizes_of(np.ones(400), 1), typical), 0.99)
     slow = sizes_of(np.linspace(1, 1.45, 600), 2)  # within the bound of 1.5
-    assert np.mean(following_drift(slow, typical) > threshold) < 0.1 and np.mean(slow > threshold) > 0.5
-    lasting = sizes_of(np.concatenate([np.ones(200), np.full(1_000, 2.5)]), 3)  # larger than bound times threshold, however long it lasts
+    assert (
+        np.mean(following_drift(slow, typical) > threshold) < 0.1
+        and np.mean(slow > threshold) > 0.5
+    )
+    lasting = sizes_of(
+        np.concatenate([np.ones(200), np.full(1_000, 2.5)]), 3
+    )  # larger than bound times threshold, however long it lasts
     assert threshold * 1.5 < 1.9 and (following_drift(lasting, typical)[200:] > threshold).all()

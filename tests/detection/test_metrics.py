@@ -28,7 +28,12 @@ def test_threshold_is_the_score_of_the_conformal_rank(number, rate, rank):
 @pytest.mark.parametrize(
     ("number", "independent", "rate", "expected"),
     [
-        (99, None, 0.01, (99, 0.01)),  # just enough scores: the conformal threshold is the largest score
+        (
+            99,
+            None,
+            0.01,
+            (99, 0.01),
+        ),  # just enough scores: the conformal threshold is the largest score
         (98, None, 0.01, (98, 1 / 99)),  # one score too few
         (199, None, 0.01, (198, 0.01)),
         (990, 98, 0.01, (990, 1 / 99)),  # correlated scores count as fewer
@@ -43,7 +48,9 @@ def test_a_finite_threshold_states_the_rate_that_it_is_set_for(number, independe
 @pytest.mark.parametrize(("number", "rate"), [(50, 0.05), (99, 0.01)])
 def test_expected_false_alarm_rate_is_kept(number, rate):
     # uniform scores: the rate of a threshold is 1 - threshold, a Beta variable
-    rates = 1 - np.array([threshold(scores, rate) for scores in np.random.default_rng(1).random((4_000, number))])
+    rates = 1 - np.array(
+        [threshold(scores, rate) for scores in np.random.default_rng(1).random((4_000, number))]
+    )
     error = 5 * np.std(rates) / np.sqrt(4_000)
     assert rate - 1 / (number + 1) - error <= np.mean(rates) <= rate + error
 

@@ -10,17 +10,23 @@ from enhsim_tf.detection.metrics import threshold
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 
 PERIODS, SIZES, WINDOW = (480, 120), (0.5, 0.25), 500
-COARSE = SquareWaveSimulator([SquareWave(period, low=-size, high=size) for period, size in zip(PERIODS, SIZES, strict=True)])
+COARSE = SquareWaveSimulator(
+    [SquareWave(period, low=-size, high=size) for period, size in zip(PERIODS, SIZES, strict=True)]
+)
 SEVERITIES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def times(number, seed):
-    return np.random.default_rng(seed).integers(0, 10**6, number)[:, None] + np.arange(float(WINDOW))
+    return np.random.default_rng(seed).integers(0, 10**6, number)[:, None] + np.arange(
+        float(WINDOW)
+    )
 
 
 def degraded(mode, severity, number=20, seed=2):
     """Coarse windows of a degraded mode."""
-    return COARSE.simulate(times(number, seed), Degraded(mode, severity), np.random.default_rng(seed))
+    return COARSE.simulate(
+        times(number, seed), Degraded(mode, severity), np.random.default_rng(seed)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -35,10 +41,18 @@ def fitted(training):
 
 def test_points_by_hand():
     # the first axis explains all but 1 / 41 of the variance; unit: root mean square of all twelve coordinates
-    training = 7 + np.array([[-4.0, 0, 0], [4, 0, 0], [-2, 0.5, 0], [-2, -0.5, 0], [2, 0.5, 0], [2, -0.5, 0]])
+    training = 7 + np.array(
+        [[-4.0, 0, 0], [4, 0, 0], [-2, 0.5, 0], [-2, -0.5, 0], [2, 0.5, 0], [2, -0.5, 0]]
+    )
     unit = np.sqrt((2 * 16 + 4 * 4 + 4 * 0.25) / 18)
-    found = OutOfRange().fit(training).score(7 + np.array([[4.0, 0, 0], [5, 3, 4], [2, 0.5, 0], [0, 0, 0]]))
-    np.testing.assert_allclose(found * unit, np.sqrt(np.array([0, 25 + 0.25 * 1, 0.25, 0.25 * 4]) / 3), atol=1e-7)
+    found = (
+        OutOfRange()
+        .fit(training)
+        .score(7 + np.array([[4.0, 0, 0], [5, 3, 4], [2, 0.5, 0], [0, 0, 0]]))
+    )
+    np.testing.assert_allclose(
+        found * unit, np.sqrt(np.array([0, 25 + 0.25 * 1, 0.25, 0.25 * 4]) / 3), atol=1e-7
+    )
 
 
 def test_a_score_has_no_unit_and_does_not_count_repeats(fitted, training):
@@ -50,7 +64,10 @@ def test_a_score_has_no_unit_and_does_not_count_repeats(fitted, training):
 
 
 def test_nominal_windows_are_in_range(fitted):
-    scores, further = fitted.score(COARSE.simulate(times(1_000, 1))), fitted.score(COARSE.simulate(times(1_000, 5)))
+    scores, further = (
+        fitted.score(COARSE.simulate(times(1_000, 1))),
+        fitted.score(COARSE.simulate(times(1_000, 5))),
+    )
     limit = threshold(scores, 0.01)
     assert np.mean(further > limit) < 0.01 + 4 * np.sqrt(0.01 / 1_000)
     for mode in ("stuck", "drift", "dropout", "period_change"):

@@ -10,8 +10,13 @@ from enhsim_tf.enhancer.ridge import PENALTIES, fit_ridge
 def _linear(num_windows, noise=0.1, seed=0, samples=12, outputs=7, columns=2):
     """Windows of two columns of different size, a known linear map of them, and noise."""
     rng = np.random.default_rng(seed)
-    inputs = rng.standard_normal((num_windows, samples, columns)) * np.array([1.0, 30.0])[:columns] + 4
-    matrix = np.random.default_rng(99).standard_normal((samples * columns, outputs)) / np.tile([1.0, 30.0][:columns], samples)[:, None]
+    inputs = (
+        rng.standard_normal((num_windows, samples, columns)) * np.array([1.0, 30.0])[:columns] + 4
+    )
+    matrix = (
+        np.random.default_rng(99).standard_normal((samples * columns, outputs))
+        / np.tile([1.0, 30.0][:columns], samples)[:, None]
+    )
     clean = inputs.reshape(num_windows, -1) @ matrix + 2
     return inputs, clean + noise * rng.standard_normal(clean.shape), clean
 
@@ -29,7 +34,11 @@ def test_it_is_scikit_learns_on_standardised_windows(num_windows, penalty):
     inputs, targets, _ = _linear(num_windows)
     new, *_ = _linear(5, seed=1)
     found = fit_ridge(inputs, targets, penalties=[penalty])
-    expected = SklearnRidge(alpha=penalty).fit(_standardised(inputs, inputs), targets).predict(_standardised(new, inputs))
+    expected = (
+        SklearnRidge(alpha=penalty)
+        .fit(_standardised(inputs, inputs), targets)
+        .predict(_standardised(new, inputs))
+    )
     np.testing.assert_allclose(found.predict(new), expected, rtol=1e-5, atol=1e-5)
     assert found.penalty == penalty and found.predict(new).dtype == np.float32
     assert len(found.factors) == (2 if num_windows == 5 else 1)
@@ -42,9 +51,21 @@ def test_the_chosen_penalty_is_that_of_a_plain_loop():
     for held_out in np.array_split(np.arange(60), 5):
         training = np.setdiff1d(np.arange(60), held_out)
         for number, penalty in enumerate(penalties):
-            model = SklearnRidge(alpha=penalty).fit(_standardised(inputs[training], inputs[training]), targets[training])
-            squares[number] += np.sum((model.predict(_standardised(inputs[held_out], inputs[training])) - targets[held_out]) ** 2)
-    assert fit_ridge(inputs, targets, penalties=penalties).penalty == penalties[np.argmin(squares)] == 30.0
+            model = SklearnRidge(alpha=penalty).fit(
+                _standardised(inputs[training], inputs[training]), targets[training]
+            )
+            squares[number] += np.sum(
+                (
+                    model.predict(_standardised(inputs[held_out], inputs[training]))
+                    - targets[held_out]
+                )
+                ** 2
+            )
+    assert (
+        fit_ridge(inputs, targets, penalties=penalties).penalty
+        == penalties[np.argmin(squares)]
+        == 30.0
+    )
 
 
 def test_constant_samples_and_constant_columns_do_no_harm():
@@ -55,8 +76,12 @@ def test_constant_samples_and_constant_columns_do_no_harm():
         windows = np.concatenate([windows, np.full((len(windows), 12, 1), 0.1, np.float32)], axis=2)
         return np.concatenate([windows, np.full((len(windows), 1, 3), 1 / 3)], axis=1)
 
-    predicted = fit_ridge(with_constants(inputs), targets, penalties=[1e-3]).predict(with_constants(new))
-    np.testing.assert_allclose(predicted, fit_ridge(inputs, targets, penalties=[1e-3 * 12 / 13]).predict(new), atol=1e-3)
+    predicted = fit_ridge(with_constants(inputs), targets, penalties=[1e-3]).predict(
+        with_constants(new)
+    )
+    np.testing.assert_allclose(
+        predicted, fit_ridge(inputs, targets, penalties=[1e-3 * 12 / 13]).predict(new), atol=1e-3
+    )
     constant = fit_ridge(np.full((6, 4), 7.0), np.arange(6.0)[:, None])
     np.testing.assert_allclose(constant.predict(np.full((1, 4), 7.0)), [[2.5]])
 
@@ -64,7 +89,11 @@ def test_constant_samples_and_constant_columns_do_no_harm():
 def test_one_window_predicts_itself_and_the_largest_of_equally_good_penalties_is_chosen():
     found = fit_ridge(np.ones((1, 4)), np.array([[3.0, 5.0]]))
     np.testing.assert_array_equal(found.predict(np.zeros((2, 4))), [[3, 5], [3, 5]])
-    assert found.penalty == fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty == max(PENALTIES)
+    assert (
+        found.penalty
+        == fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty
+        == max(PENALTIES)
+    )
 
 
 def _of_two_channels(num_windows):
@@ -81,23 +110,37 @@ def test_channels_are_fitted_as_if_each_were_alone(num_windows):
     for channel in range(2):
         alone = fit_ridge(inputs, targets[:, channel::2])
         assert alone.penalty == together.chosen[channel]
-        np.testing.assert_allclose(together.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4)
+        np.testing.assert_allclose(
+            together.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4
+        )
     assert together.penalty == min(together.chosen) < max(together.chosen)
 
 
 def test_chosen_penalties_are_kept_and_nothing_is_cross_validated():
     inputs, targets = _of_two_channels(60)
-    found, new = fit_ridge(inputs, targets, num_channels=2, chosen=(0.5, 70.0)), _linear(5, seed=1)[0]
+    found, new = (
+        fit_ridge(inputs, targets, num_channels=2, chosen=(0.5, 70.0)),
+        _linear(5, seed=1)[0],
+    )
     assert found.chosen == (0.5, 70.0)
     for channel, penalty in enumerate(found.chosen):
         alone = fit_ridge(inputs, targets[:, channel::2], penalties=[penalty])
-        np.testing.assert_allclose(found.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4)
+        np.testing.assert_allclose(
+            found.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4
+        )
 
 
 def test_windows_may_overlap_and_come_in_any_order():
     # each window twice: without their starts, the copy in training would make the smallest penalty the best
     inputs, targets, _ = _linear(60, noise=10.0, samples=40)
-    inputs, targets, starts = inputs.repeat(2, axis=0), targets.repeat(2, axis=0), np.repeat(40 * np.arange(60), 2)
+    inputs, targets, starts = (
+        inputs.repeat(2, axis=0),
+        targets.repeat(2, axis=0),
+        np.repeat(40 * np.arange(60), 2),
+    )
     order = np.random.default_rng(3).permutation(120)
-    first, second = fit_ridge(inputs, targets, starts), fit_ridge(inputs[order], targets[order], starts[order])
+    first, second = (
+        fit_ridge(inputs, targets, starts),
+        fit_ridge(inputs[order], targets[order], starts[order]),
+    )
     assert first.penalty == second.penalty > fit_ridge(inputs[order], targets[order]).penalty

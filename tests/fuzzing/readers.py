@@ -34,14 +34,24 @@ def changed(draw, seeds):
         begin = draw(st.integers(0, len(data)))
         end = min(len(data), begin + draw(st.sampled_from([0, 1, 2, 8, 64, len(data)])))
         other = draw(st.sampled_from(seeds))
-        data = data[:begin] + draw(_PIECES | st.just(data[begin:end] * 2) | st.just(other[begin:end])) + data[end:]
+        data = (
+            data[:begin]
+            + draw(_PIECES | st.just(data[begin:end] * 2) | st.just(other[begin:end]))
+            + data[end:]
+        )
     return data
 
 
 def tried(examples):
     """Settings of a slow test that tries that many inputs in an ordinary run."""
     number, checks = _LONG or examples, list(HealthCheck)
-    chosen = settings(derandomize=not _LONG, max_examples=number, deadline=None, database=None, suppress_health_check=checks)
+    chosen = settings(
+        derandomize=not _LONG,
+        max_examples=number,
+        deadline=None,
+        database=None,
+        suppress_health_check=checks,
+    )
     return lambda test: pytest.mark.slow(chosen(test))
 
 
@@ -64,7 +74,12 @@ def judge(read, *arguments):
 
 def is_good(line):
     """Whether an error message is one short printable line that says what was expected and received."""
-    return line.isprintable() and len(line) <= _MAX_CHARACTERS and line.startswith("Expected ") and "Received: " in line
+    return (
+        line.isprintable()
+        and len(line) <= _MAX_CHARACTERS
+        and line.startswith("Expected ")
+        and "Received: " in line
+    )
 
 
 def all_of(*calls):

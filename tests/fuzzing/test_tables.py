@@ -25,7 +25,13 @@ def use(source):
     def channels(cleaning):
         for series in read_source(source, options=cleaning).values():
             cleaned = clean(series, cleaning)
-            assert all(line.isprintable() for line in (*cleaned.report.lines(), json.dumps(cleaned.report.to_dict(), allow_nan=False)))
+            assert all(
+                line.isprintable()
+                for line in (
+                    *cleaned.report.lines(),
+                    json.dumps(cleaned.report.to_dict(), allow_nan=False),
+                )
+            )
             assert all(np.isfinite(part.values).all() and len(part) for part in cleaned.parts)
 
     all_of(lambda: channels(Cleaning()), lambda: channels(Cleaning(interval_s=1.0, drop_bad=True)))
@@ -40,12 +46,20 @@ def csv_seeds():
     times = pd.date_range("2024-10-27", periods=NUM, freq="h")
     frames = [
         pd.DataFrame({"time": times, "value": WAVE}).to_csv(index=False),
-        pd.DataFrame({"time": times.tz_localize("UTC"), "value": WAVE, "word": "on"}).to_csv(index=False),
-        pd.DataFrame({"time": np.arange(NUM) * 60, "value": WAVE}).to_csv(index=False, sep=";", decimal=","),
+        pd.DataFrame({"time": times.tz_localize("UTC"), "value": WAVE, "word": "on"}).to_csv(
+            index=False
+        ),
+        pd.DataFrame({"time": np.arange(NUM) * 60, "value": WAVE}).to_csv(
+            index=False, sep=";", decimal=","
+        ),
         "# made by hand\n# twice\nvalue\n" + "\n".join(map(str, WAVE)),
-        'time,"a ""b""",c\n2024-01-01 00:00:59,1,x\n2024-01-01 00:00:60,,y\n2024-01-01 00:01:01,nan,1e5\n' * 3,
+        'time,"a ""b""",c\n2024-01-01 00:00:59,1,x\n2024-01-01 00:00:60,,y\n2024-01-01 00:01:01,nan,1e5\n'
+        * 3,
     ]
-    return [text.encode() for text in frames] + [frames[0].encode("utf-16"), frames[1].replace("word", "Größe").encode("latin-1")]
+    return [text.encode() for text in frames] + [
+        frames[0].encode("utf-16"),
+        frames[1].replace("word", "Größe").encode("latin-1"),
+    ]
 
 
 def parquet_of(table, **options):
@@ -58,17 +72,42 @@ def tables():
     times = pd.date_range("2024-01-01", periods=NUM, freq="min")
     frames = [
         pd.DataFrame({"time": times, "value": WAVE}),
-        pd.DataFrame({"value": WAVE.astype(np.float32)}, index=pd.DatetimeIndex(times, tz="Europe/Berlin", name="t")),
-        pd.DataFrame({"time": times.astype(str), "value": [f"{value}" for value in WAVE], "flag": WAVE > 0}),
-        pd.DataFrame({"value": pd.Categorical([1.5, 2.5, 3.5] * 20), "day": times.date, "span": times - times[0]}),
+        pd.DataFrame(
+            {"value": WAVE.astype(np.float32)},
+            index=pd.DatetimeIndex(times, tz="Europe/Berlin", name="t"),
+        ),
+        pd.DataFrame(
+            {"time": times.astype(str), "value": [f"{value}" for value in WAVE], "flag": WAVE > 0}
+        ),
+        pd.DataFrame(
+            {
+                "value": pd.Categorical([1.5, 2.5, 3.5] * 20),
+                "day": times.date,
+                "span": times - times[0],
+            }
+        ),
     ]
-    nested = pa.table({"value": pa.array([[1.0, 2.0]] * 9), "s": pa.array([{"a": 1}] * 9), "n": pa.nulls(9), "b": pa.array([b"x"] * 9)})
-    odd = pa.table({"value": pa.array([1, 2, 3], pa.decimal128(10, 2)), "time": pa.array([1, 2, 3], pa.date32())})
+    nested = pa.table(
+        {
+            "value": pa.array([[1.0, 2.0]] * 9),
+            "s": pa.array([{"a": 1}] * 9),
+            "n": pa.nulls(9),
+            "b": pa.array([b"x"] * 9),
+        }
+    )
+    odd = pa.table(
+        {
+            "value": pa.array([1, 2, 3], pa.decimal128(10, 2)),
+            "time": pa.array([1, 2, 3], pa.date32()),
+        }
+    )
     return [*map(pa.Table.from_pandas, frames), nested, odd]
 
 
 def parquet_seeds():
-    return [parquet_of(table) for table in tables()] + [parquet_of(tables()[0], compression="zstd", use_dictionary=False)]
+    return [parquet_of(table) for table in tables()] + [
+        parquet_of(tables()[0], compression="zstd", use_dictionary=False)
+    ]
 
 
 def npy_of(array):
@@ -80,8 +119,21 @@ def npy_of(array):
 def npy_seeds():
     archive = io.BytesIO()
     np.savez(archive, value=WAVE)
-    arrays = [WAVE, np.stack([WAVE, WAVE], 1), (100 * WAVE).astype(">i2"), WAVE.astype("U8"), WAVE > 0, WAVE + 0j, np.array([None, "a"])]
-    arrays += [np.arange(NUM).astype("datetime64[s]"), np.zeros(3, [("a", "f4")]), np.zeros((2, 3, 4)), np.array(1.0)]
+    arrays = [
+        WAVE,
+        np.stack([WAVE, WAVE], 1),
+        (100 * WAVE).astype(">i2"),
+        WAVE.astype("U8"),
+        WAVE > 0,
+        WAVE + 0j,
+        np.array([None, "a"]),
+    ]
+    arrays += [
+        np.arange(NUM).astype("datetime64[s]"),
+        np.zeros(3, [("a", "f4")]),
+        np.zeros((2, 3, 4)),
+        np.array(1.0),
+    ]
     return [npy_of(array) for array in arrays] + [archive.getvalue()]
 
 
@@ -111,7 +163,11 @@ def test_changed_files(name, data):
 
 
 def test_a_time_too_far_off_for_its_zone_is_refused(tmp_path, refused):
-    times = pd.DatetimeIndex(np.array([0, 60, 10**12]).view("datetime64[s]")).tz_localize("UTC").tz_convert("Europe/Berlin")
+    times = (
+        pd.DatetimeIndex(np.array([0, 60, 10**12]).view("datetime64[s]"))
+        .tz_localize("UTC")
+        .tz_convert("Europe/Berlin")
+    )
     pd.DataFrame({"time": times, "value": [1.0, 2.0, 3.0]}).to_parquet(tmp_path / "x.parquet")
     with refused("a time out of range", "row 2"):
         read_source(tmp_path / "x.parquet")

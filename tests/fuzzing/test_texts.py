@@ -23,7 +23,11 @@ def name_of_a_channel(name, folder):
     found = folder_of(folder, name)
     found.mkdir()
     assert found.parent == folder and [path.name for path in folder.iterdir()] == [found.name]
-    assert found.name.isascii() and not set(found.name) & set('\\/:*?"<>|.') and found.name.upper() not in ("CON", "NUL", " ")
+    assert (
+        found.name.isascii()
+        and not set(found.name) & set('\\/:*?"<>|.')
+        and found.name.upper() not in ("CON", "NUL", " ")
+    )
 
 
 def address(text, folder):
@@ -32,16 +36,24 @@ def address(text, folder):
 
 
 def zone(text, folder):
-    clean(pd.Series(np.arange(60.0), index=pd.date_range("2024-10-26", periods=60, freq="h")), Cleaning(timezone=text))
+    clean(
+        pd.Series(np.arange(60.0), index=pd.date_range("2024-10-26", periods=60, freq="h")),
+        Cleaning(timezone=text),
+    )
 
 
 def time_format(text, folder):
-    clean(pd.Series(np.arange(20.0), index=[f"26.10.24 {hour:02d}:00:00" for hour in range(20)]), Cleaning(time_format=text))
+    clean(
+        pd.Series(np.arange(20.0), index=[f"26.10.24 {hour:02d}:00:00" for hour in range(20)]),
+        Cleaning(time_format=text),
+    )
 
 
 def column(text, folder):
     path = folder / "x.csv"
-    pd.DataFrame({"time": range(9), "value": np.arange(9.0) ** 2, "Größe": 1.5}).to_csv(path, index=False)
+    pd.DataFrame({"time": range(9), "value": np.arange(9.0) ** 2, "Größe": 1.5}).to_csv(
+        path, index=False
+    )
     np.save(folder / "x.npy", np.zeros((4, 3)))
     all_of(
         lambda: read_source(path, [text]),
@@ -67,7 +79,11 @@ def command_line(text, folder):
 
 READERS = {
     name_of_a_channel: ["volts", "a/b", "..", "CON", "Größe 1.", " x "],
-    address: ["influxdb://bucket/measurement/field", "influxdb://b%2Fc/m/f?tag=value&other=%C3%A9", "influxdb://user:pass@host/m/f?a=b"],
+    address: [
+        "influxdb://bucket/measurement/field",
+        "influxdb://b%2Fc/m/f?tag=value&other=%C3%A9",
+        "influxdb://user:pass@host/m/f?a=b",
+    ],
     zone: ["Europe/Berlin", "UTC", "+02:00"],
     time_format: ["%d.%m.%y %H:%M:%S", "ISO8601", "mixed"],
     column: ["value", "time", "none", "0", "Größe"],
@@ -80,7 +96,11 @@ READERS = {
     ],
     lambda text, folder: parse_scenario(text): ["stuck:0.5:0.25", "volts=drift:0.2-0.8:1e-3-0.9"],
     lambda text, folder: parse_num_samples(text, 0.5): ["1d", "6h", "90min", "5000", "1.5 s"],
-    lambda text, folder: parse_start(text): ["2024-01-01", "2024-01-01T12:00:00.5+02:00", "2024-W01-1"],
+    lambda text, folder: parse_start(text): [
+        "2024-01-01",
+        "2024-01-01T12:00:00.5+02:00",
+        "2024-W01-1",
+    ],
     lambda text, folder: parse_workers(text): ["auto", "2", "16"],
 }
 FOUND = [  # inputs that once were neither accepted nor refused well
@@ -102,5 +122,7 @@ def test_what_once_failed_is_used_or_refused(read, text):
 @tried(60)
 @given(st.data())
 def test_texts(read, data):
-    seeds = changed([seed.encode() for seed in READERS[read]]).map(lambda seed: seed.decode("utf-8", "surrogateescape"))
+    seeds = changed([seed.encode() for seed in READERS[read]]).map(
+        lambda seed: seed.decode("utf-8", "surrogateescape")
+    )
     judge(read, data.draw(seeds | st.text(max_size=60)))

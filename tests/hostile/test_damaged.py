@@ -40,10 +40,22 @@ def sign(model):
 
 MODELS = {
     "arrays cut off": ("arrays.npz", half, "missing or damaged file"),
-    "settings by hand": ("settings.json", lambda content: content.replace(b"2.0", b"3.0"), "missing or damaged file"),
+    "settings by hand": (
+        "settings.json",
+        lambda content: content.replace(b"2.0", b"3.0"),
+        "missing or damaged file",
+    ),
     "settings cut off": ("settings.json", half, "missing or damaged file"),
-    "another version": ("manifest.json", lambda content: content.replace(b"Simulator/6", b"Simulator/4"), "format 4"),
-    "another program": ("manifest.json", lambda content: b'{"name": "an app"}', "KeyError in manifest.json"),
+    "another version": (
+        "manifest.json",
+        lambda content: content.replace(b"Simulator/6", b"Simulator/4"),
+        "format 4",
+    ),
+    "another program": (
+        "manifest.json",
+        lambda content: b'{"name": "an app"}',
+        "KeyError in manifest.json",
+    ),
     "a list": ("manifest.json", lambda content: b"[1, 2]", "TypeError in manifest.json"),
     "manifest cut off": ("manifest.json", half, "JSONDecodeError in manifest.json"),
 }
@@ -65,7 +77,9 @@ def test_a_model_without_one_of_its_files_is_refused(model, refused, name):
 
 
 def test_a_model_with_a_part_that_this_version_does_not_know_is_refused(model, refused):
-    rewrite(model / "settings.json", lambda content: content.replace(b"WindowBootstrap", b"PinkNoise"))
+    rewrite(
+        model / "settings.json", lambda content: content.replace(b"WindowBootstrap", b"PinkNoise")
+    )
     sign(model)
     with refused("'PinkNoise'", "Fit it again"):
         EnhancedSimulator.load(model)
@@ -78,7 +92,9 @@ def test_a_model_without_names_of_channels_is_refused_before_it_is_loaded(model,
         channels_by_model(["volts"], {"volts": model})
 
 
-TABLE = pd.DataFrame({"time": pd.date_range("2024-01-01", periods=500, freq="s"), "volts": np.arange(500.0) % 7})
+TABLE = pd.DataFrame(
+    {"time": pd.date_range("2024-01-01", periods=500, freq="s"), "volts": np.arange(500.0) % 7}
+)
 
 
 @pytest.mark.filterwarnings("error")
@@ -104,7 +120,9 @@ def test_a_source_that_is_cut_off_is_refused(tmp_path, refused, name):
 
 
 @pytest.mark.parametrize(
-    "array", [np.array(["a", "b"]), np.zeros(3, [("a", "f4")]), np.array([1, None])], ids=["text", "records", "objects"]
+    "array",
+    [np.array(["a", "b"]), np.zeros(3, [("a", "f4")]), np.array([1, None])],
+    ids=["text", "records", "objects"],
 )
 def test_an_array_of_no_numbers_is_refused(tmp_path, refused, array):
     np.save(tmp_path / "a.npy", array)

@@ -23,14 +23,22 @@ NAMES = (
     "-rf", "~", "%2e%2e", "%", "a?b*c|d", "$HOME", "`id`", "a" * 160,
 )  # fmt: skip
 REFUSED = ("", "a" * 181, "é" * 40, "\ud800", "a\udcffb", "." * 61)
-KEPT = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}  # reserved by Windows
+KEPT = {
+    "con",
+    "prn",
+    "aux",
+    "nul",
+    *(f"{port}{number}" for port in ("com", "lpt") for number in range(10)),
+}  # reserved by Windows
 ALLOWED = set(string.ascii_letters + string.digits + "%_-~ ")
 
 
 def check_file_name(name):
     found = str(folder_of("", name))
     assert set(found) <= ALLOWED and 1 <= len(found) <= 160 and urllib.parse.unquote(found) == name
-    assert found.casefold() not in KEPT and found == found.strip() and os.path.basename(found) == found
+    assert (
+        found.casefold() not in KEPT and found == found.strip() and os.path.basename(found) == found
+    )
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -40,7 +48,10 @@ def test_a_name_that_cannot_be_a_file_name_is_refused(name, refused, tmp_path):
 
 
 @settings(derandomize=True, max_examples=100, deadline=None, database=None)
-@given(st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=14), st.text(min_size=1, max_size=14))
+@given(
+    st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=14),
+    st.text(min_size=1, max_size=14),
+)
 def test_any_name_is_encoded_as_a_distinct_file_name(name, other):
     check_file_name(name)
     assert name == other or folder_of("", name) != folder_of("", other)
@@ -59,11 +70,15 @@ def lines_of(capfd):
     """The printed output; checks that it has only printable characters."""
     out, error = capfd.readouterr()
     lines = [*out.split("\n"), *error.split("\n")]
-    assert all(line.isprintable() for line in lines), [line for line in lines if not line.isprintable()]
+    assert all(line.isprintable() for line in lines), [
+        line for line in lines if not line.isprintable()
+    ]
     return lines
 
 
-COMMANDED = [name for name in NAMES if name == name.strip()]  # spaces around the column names of a table are stripped
+COMMANDED = [
+    name for name in NAMES if name == name.strip()
+]  # spaces around the column names of a table are stripped
 
 
 @pytest.fixture
@@ -84,13 +99,18 @@ def test_training_data_of_hostile_channels_stay_in_their_folder(models, tmp_path
     found = pd.read_parquet(folder_of(out, "..").with_suffix(".parquet"))
     assert len(found) == 3
     for name in ("\x1b[31mnot there", "\ud800", "x" * 2_000):
-        assert main(["generate", str(models), "--windows", "3", "--channel", name, "--out", str(out)]) == 2
+        assert (
+            main(["generate", str(models), "--windows", "3", "--channel", name, "--out", str(out)])
+            == 2
+        )
         lines_of(capfd)
 
 
 def table_of(names, num_samples=200):
     times = pd.date_range("2024-01-01", periods=num_samples, freq="2s")
-    wave = np.sin(np.arange(num_samples) / 3) + 0.1 * np.random.default_rng(0).standard_normal(num_samples)
+    wave = np.sin(np.arange(num_samples) / 3) + 0.1 * np.random.default_rng(0).standard_normal(
+        num_samples
+    )
     return pd.DataFrame({"time": times} | {name: wave for name in names})
 
 
@@ -99,22 +119,45 @@ def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
     names = ["../../<script>\x1b[31m", "CON"]
     source, out = tmp_path / "world" / "x.parquet", tmp_path / "world" / "models"
     source.parent.mkdir()
-    table_of([*names, "short\x1b[31m\n"], 1_500).assign(**{"short\x1b[31m\n": [1.0] * 2 + [np.nan] * 1_498}).to_parquet(source)
-    tiny = ["--num-windows", "40", "--window", "64", "--enhancer", "ridge", "--noise", "residual-windows", "--separately", "--workers", "1"]
+    table_of([*names, "short\x1b[31m\n"], 1_500).assign(
+        **{"short\x1b[31m\n": [1.0] * 2 + [np.nan] * 1_498}
+    ).to_parquet(source)
+    tiny = [
+        "--num-windows",
+        "40",
+        "--window",
+        "64",
+        "--enhancer",
+        "ridge",
+        "--noise",
+        "residual-windows",
+        "--separately",
+        "--workers",
+        "1",
+    ]
     assert main(["fit", str(source), "--out", str(out), *tiny]) == 2  # one is too short
     made = files_below(tmp_path) - {source}
     assert {path.parent for path in made} == {folder_of(out, name) for name in names}
     assert set(models_of(out)) == set(names)
     lines = lines_of(capfd)
-    assert sum("<script>" in line for line in lines) and sum(line.startswith("error: short") for line in lines) == 1
+    assert (
+        sum("<script>" in line for line in lines)
+        and sum(line.startswith("error: short") for line in lines) == 1
+    )
     report = json.loads((folder_of(out, names[0]) / "report.json").read_text())
-    assert list(report["cleaning"]) == report["report"]["channels"] == [names[0]]  # JSON keeps the name unchanged
+    assert (
+        list(report["cleaning"]) == report["report"]["channels"] == [names[0]]
+    )  # JSON keeps the name unchanged
     assert "\x1b" not in (folder_of(out, names[0]) / "report.json").read_text()
 
 
 @pytest.mark.parametrize("name", ["\x1b[31mred", "\u202eevil"])
 def test_findings_about_hostile_columns_are_plain_lines(tmp_path, name):
-    table_of(["value"]).assign(**{name: "word"}).rename(columns={"time": f"{name} time"}).to_csv(tmp_path / "x.csv", index=False)
+    table_of(["value"]).assign(**{name: "word"}).rename(columns={"time": f"{name} time"}).to_csv(
+        tmp_path / "x.csv", index=False
+    )
     (series,) = read_source(tmp_path / "x.csv").values()
     lines = clean(series).report.lines()
-    assert all(line.isprintable() for line in lines) and any("columns without numbers" in line for line in lines)
+    assert all(line.isprintable() for line in lines) and any(
+        "columns without numbers" in line for line in lines
+    )

@@ -65,11 +65,15 @@ def broken(simulator, which):
         simulator.noise = WindowBootstrap(np.zeros((1, simulator.window, 1)))
         simulator.noise.windows[:] = np.nan
     else:
-        simulator.enhancer = dataclasses.replace(simulator.enhancer, bias=simulator.enhancer.bias * np.nan)
+        simulator.enhancer = dataclasses.replace(
+            simulator.enhancer, bias=simulator.enhancer.bias * np.nan
+        )
     return simulator
 
 
-RUN = Recording((Run(np.random.default_rng(1).standard_normal((1_500, 1)).astype(np.float32)),), ("watts",))
+RUN = Recording(
+    (Run(np.random.default_rng(1).standard_normal((1_500, 1)).astype(np.float32)),), ("watts",)
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,9 +93,15 @@ def test_what_is_not_finite_is_neither_generated_nor_scored(kind, which, of_run,
         lambda: simulator.generate(3),
         lambda: simulator.generate_series(200),
         lambda: score(simulator, telemetry, run, ScoreOptions(num_windows=20)),
-        lambda: write_windows(tmp_path / "x.parquet", Plan((), 1.0, tmp_path, "", 64, 1.0, ("volts",), 0, 5, 5), simulator),
+        lambda: write_windows(
+            tmp_path / "x.parquet",
+            Plan((), 1.0, tmp_path, "", 64, 1.0, ("volts",), 0, 5, 5),
+            simulator,
+        ),
     ]
-    for use in uses if kind == "waves" else [*uses, lambda: list(simulator.generate_copies(RUN, 1))]:
+    for use in (
+        uses if kind == "waves" else [*uses, lambda: list(simulator.generate_copies(RUN, 1))]
+    ):
         with refused("finite", "Fit it again"):
             use()
     assert not list(tmp_path.iterdir())

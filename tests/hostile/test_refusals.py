@@ -14,7 +14,17 @@ def refused_line(tmp_path, capfd):
 
     def run(*arguments):
         before = files()
-        code = main(["--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--budget", "smoke", *map(str, arguments)])
+        code = main(
+            [
+                "--out",
+                str(tmp_path / "out"),
+                "--cache",
+                str(tmp_path / "cache"),
+                "--budget",
+                "smoke",
+                *map(str, arguments),
+            ]
+        )
         out, error = capfd.readouterr()
         assert (code, out, error.count("\n")) == (2, "", 1)
         assert error.startswith("error: Expected ") and "Received: " in error
@@ -28,7 +38,10 @@ def refused_line(tmp_path, capfd):
     ("arguments", "word"),
     [
         (["--seed", "-1"], "-1"),
-        (["--seed", str(2**32)], str(2**32)),  # the detectors and the classifier accept no larger seed
+        (
+            ["--seed", str(2**32)],
+            str(2**32),
+        ),  # the detectors and the classifier accept no larger seed
         (["--only", "fig99"], "fig99"),
         (["--seed", "abc"], "'abc'"),
         (["--budget", "tiny"], "'tiny'"),
@@ -43,7 +56,9 @@ def test_a_bad_option_is_refused_in_one_line(refused_line, arguments, word):
     assert word in refused_line(*arguments)
 
 
-@pytest.mark.parametrize("spelling", ["figures", "figures/", "./figures", "smoke/../figures", "absolute", "link"])
+@pytest.mark.parametrize(
+    "spelling", ["figures", "figures/", "./figures", "smoke/../figures", "absolute", "link"]
+)
 def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch, spelling):
     for folder in ("figures", "smoke"):
         (tmp_path / folder).mkdir()

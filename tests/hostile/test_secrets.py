@@ -33,18 +33,62 @@ def world(tmp_path):
 
 RUNS = {
     "a fit from a database": ["fit", "influxdb://bucket/measurement/field", "--out", "{0}/new"],
-    "a fit from an address with a password": ["fit", f"influxdb://user:{PASSWORD}@host/m/f", "--out", "{0}/new"],
+    "a fit from an address with a password": [
+        "fit",
+        f"influxdb://user:{PASSWORD}@host/m/f",
+        "--out",
+        "{0}/new",
+    ],
     "a token in the address": ["fit", f"influxdb://host/m/f?token={TOKEN}", "--out", "{0}/new"],
-    "a token for a channel": ["generate", "{0}/models", "--windows", "3", "--channel", TOKEN, "--out", "{0}/y.parquet"],
-    "a large data set": ["generate", "{0}/models", "--windows", "30", "--workers", "1", "--out", "{0}/set"],
-    "a cluster that is not there": ["generate", "{0}/models", "--windows", "30", "--engine", "ray", "--out", "{0}/set"],
-    "scores": ["score", "{0}/models", "{0}/x.csv", "--windows", "40", "--detector", "limit-check", "--out", "{0}/y.parquet"],
+    "a token for a channel": [
+        "generate",
+        "{0}/models",
+        "--windows",
+        "3",
+        "--channel",
+        TOKEN,
+        "--out",
+        "{0}/y.parquet",
+    ],
+    "a large data set": [
+        "generate",
+        "{0}/models",
+        "--windows",
+        "30",
+        "--workers",
+        "1",
+        "--out",
+        "{0}/set",
+    ],
+    "a cluster that is not there": [
+        "generate",
+        "{0}/models",
+        "--windows",
+        "30",
+        "--engine",
+        "ray",
+        "--out",
+        "{0}/set",
+    ],
+    "scores": [
+        "score",
+        "{0}/models",
+        "{0}/x.csv",
+        "--windows",
+        "40",
+        "--detector",
+        "limit-check",
+        "--out",
+        "{0}/y.parquet",
+    ],
 }
 DONE = {"a large data set", "scores"}
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * ("cluster" in name)) for name in RUNS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * ("cluster" in name)) for name in RUNS]
+)
 def test_a_run_prints_and_writes_no_secret(world, capfd, caplog, name):
     caplog.set_level(logging.DEBUG, "enhsim_tf")
     if "cluster" in name:
@@ -55,22 +99,43 @@ def test_a_run_prints_and_writes_no_secret(world, capfd, caplog, name):
     written = [path for path in world.rglob("*") if path.is_file()]
     for secret in (TOKEN, PASSWORD):
         assert secret not in said
-        assert not [path for path in written if secret.encode() in path.read_bytes() or secret in path.name]
+        assert not [
+            path for path in written if secret.encode() in path.read_bytes() or secret in path.name
+        ]
     assert said and len(written) >= 4  # the table, and the three files of the model
 
 
-@pytest.mark.parametrize("address", [f"influxdb://user:{PASSWORD}@host/m", f"https://user:{PASSWORD}@[::1]:8086/x?y=z", f"//:{PASSWORD}@h"])
+@pytest.mark.parametrize(
+    "address",
+    [
+        f"influxdb://user:{PASSWORD}@host/m",
+        f"https://user:{PASSWORD}@[::1]:8086/x?y=z",
+        f"//:{PASSWORD}@h",
+    ],
+)
 def test_no_refusal_repeats_a_password(address, tmp_path):
     for use in (parse_location, read_source, lambda text: read_source(tmp_path / "x.csv", [text])):
         (tmp_path / "x.csv").write_text("value\n1\n2\n")
         with pytest.raises(InputError) as caught:
             use(address)
-        for told in (str(caught.value), repr(caught.value), repr(pickle.loads(pickle.dumps(caught.value))), repr(vars(caught.value))):
+        for told in (
+            str(caught.value),
+            repr(caught.value),
+            repr(pickle.loads(pickle.dumps(caught.value))),
+            repr(vars(caught.value)),
+        ):
             assert PASSWORD not in told
 
 
 @pytest.mark.parametrize(
-    "address", ["influxdb://user:se/cret@host/m", "https://se:cr et@b/x", "user:pw@host:10001", "'user:pw@[::1]:1'", "ray://:pass@h:1"]
+    "address",
+    [
+        "influxdb://user:se/cret@host/m",
+        "https://se:cr et@b/x",
+        "user:pw@host:10001",
+        "'user:pw@[::1]:1'",
+        "ray://:pass@h:1",
+    ],
 )
 def test_passwords_of_unusual_addresses_are_hidden(address):
     line = str(InputError(f"Expected a. Received: {address}. Do c."))
@@ -86,6 +151,11 @@ def test_no_refusal_repeats_the_token(monkeypatch, token):
 
 
 def test_addresses_and_words_without_secrets_stay_as_they_are(monkeypatch):
-    monkeypatch.setenv("INFLUXDB_V2_TOKEN", "a")  # a short token may be an ordinary word of a message
-    for text in ("Expected a time at 12:30. Received: http://host:8086/a@b.", "Expected a. Received: influxdb://bucket/measurement/a:b@c."):
+    monkeypatch.setenv(
+        "INFLUXDB_V2_TOKEN", "a"
+    )  # a short token may be an ordinary word of a message
+    for text in (
+        "Expected a time at 12:30. Received: http://host:8086/a@b.",
+        "Expected a. Received: influxdb://bucket/measurement/a:b@c.",
+    ):
         assert str(InputError(text)) == text

@@ -15,8 +15,14 @@ def ar1(num_windows, window, coefficient=0.9, seed=0):
 
 @pytest.mark.parametrize("follows_signal", [False, True])
 def test_all_channels_are_those_of_one_window(follows_signal):
-    levels = np.ones((20, 40, 2)) * default_rng(0).standard_normal((20, 1, 1)) * [1.0, -3.0]  # the channels of a window belong together
-    noise = WindowBootstrap.fit(levels, np.zeros((20, 40, 2))) if follows_signal else WindowBootstrap(levels)
+    levels = (
+        np.ones((20, 40, 2)) * default_rng(0).standard_normal((20, 1, 1)) * [1.0, -3.0]
+    )  # the channels of a window belong together
+    noise = (
+        WindowBootstrap.fit(levels, np.zeros((20, 40, 2)))
+        if follows_signal
+        else WindowBootstrap(levels)
+    )
     drawn = noise.generate(60, default_rng(3), np.zeros((60, 40, 2)))
     assert {row.tobytes() for row in drawn} <= {row.tobytes() for row in noise.windows}
     series = noise.generate_series(500, default_rng(0), np.zeros((500, 2)))
@@ -25,7 +31,9 @@ def test_all_channels_are_those_of_one_window(follows_signal):
 
 
 def test_every_channel_of_a_signal_counts_whatever_its_unit():
-    signal = np.stack([1e-6 * sines(400, 80, 1), np.full((400, 80), 1e3) + 1e-3 * sines(400, 80, 2)], axis=2)
+    signal = np.stack(
+        [1e-6 * sines(400, 80, 1), np.full((400, 80), 1e3) + 1e-3 * sines(400, 80, 2)], axis=2
+    )
     windows = (signal - signal.mean(axis=(0, 1))) / signal.std(axis=(0, 1))
     drawn = WindowBootstrap.fit(windows, signal).generate(400, default_rng(3), signal)
     for channel in range(2):
@@ -35,20 +43,32 @@ def test_every_channel_of_a_signal_counts_whatever_its_unit():
 @pytest.mark.parametrize("follows_signal", [False, True])
 def test_windows_are_drawn_with_replacement_and_all_equally_often(follows_signal):
     windows, signal = ar1(20, 40), np.zeros((4_000, 40))
-    noise = WindowBootstrap.fit(windows, signal[:20]) if follows_signal else WindowBootstrap(windows)
+    noise = (
+        WindowBootstrap.fit(windows, signal[:20]) if follows_signal else WindowBootstrap(windows)
+    )
     _, counts = np.unique(noise.generate(4_000, default_rng(3), signal), axis=0, return_counts=True)
-    assert len(counts) == 20 and 130 < counts.min() < 190 and 210 < counts.max() < 270  # binomial counts of mean 200 and sd 14
+    assert (
+        len(counts) == 20 and 130 < counts.min() < 190 and 210 < counts.max() < 270
+    )  # binomial counts of mean 200 and sd 14
 
 
 def test_noise_of_the_name_none_is_zero_and_an_unknown_name_is_refused(refused):
     windows = np.ones((30, 40, 2), np.float32)
-    assert not fit_noise("none", windows, windows).generate_series(90, default_rng(0), np.zeros((90, 2))).any()
+    assert (
+        not fit_noise("none", windows, windows)
+        .generate_series(90, default_rng(0), np.zeros((90, 2)))
+        .any()
+    )
     with refused("'pink'"):
         fit_noise("pink", windows, windows)
 
 
 def test_a_mean_stays_constant_across_seams():
-    np.testing.assert_allclose(WindowBootstrap(np.full((5, 400), 3.0)).generate_series(2_000, default_rng(0)), 3.0, rtol=1e-6)
+    np.testing.assert_allclose(
+        WindowBootstrap(np.full((5, 400), 3.0)).generate_series(2_000, default_rng(0)),
+        3.0,
+        rtol=1e-6,
+    )
 
 
 def sines(num_windows, window, seed=0, period=40):
@@ -67,9 +87,21 @@ def test_matched_windows_are_real_ones_of_the_nearest_signals():
     drawn = WindowBootstrap.fit(windows, signal).generate(400, default_rng(3), signal)
     rows = [np.flatnonzero((windows == each).all(axis=1))[0] for each in drawn]
     apart = np.abs(
-        np.angle(np.exp(2j * np.pi * (np.array([np.argmax(each[:40]) for each in signal[rows]]) - signal[:, :40].argmax(axis=1)) / 40))
+        np.angle(
+            np.exp(
+                2j
+                * np.pi
+                * (
+                    np.array([np.argmax(each[:40]) for each in signal[rows]])
+                    - signal[:, :40].argmax(axis=1)
+                )
+                / 40
+            )
+        )
     )
-    assert apart.max() <= 1.01 * 2 * np.pi * 2 / 40  # 20 of 400 windows: at most two of 40 phases away
+    assert (
+        apart.max() <= 1.01 * 2 * np.pi * 2 / 40
+    )  # 20 of 400 windows: at most two of 40 phases away
 
 
 def test_matched_noise_follows_the_signal_and_whole_windows_do_not():
@@ -86,13 +118,19 @@ def test_matched_noise_follows_the_signal_and_whole_windows_do_not():
 
 def test_a_matched_series_keeps_scale_and_mean_across_seams():
     signal = sines(2_000, 80)
-    error = 0.5 * np.cos(2 * np.pi * np.arange(4_000) / 40)  # of the enhancer: the same in every period
+    error = 0.5 * np.cos(
+        2 * np.pi * np.arange(4_000) / 40
+    )  # of the enhancer: the same in every period
     series_signal = np.sin(2 * np.pi * np.arange(4_000) / 40)
     windows = loud_where_high(signal) + 0.5 * np.gradient(signal, axis=1) * 40 / (2 * np.pi)
     noise = WindowBootstrap.fit(windows, signal)
-    series = np.stack([noise.generate_series(4_000, default_rng(seed), series_signal) for seed in range(60)])
+    series = np.stack(
+        [noise.generate_series(4_000, default_rng(seed), series_signal) for seed in range(60)]
+    )
     # sums of squared weights are one, so that neither the scale nor the error of the enhancer is larger at seams
-    assert np.abs(series.mean(axis=0) - error).max() < 0.3 * 4  # standard error at the loudest phase: 0.27
+    assert (
+        np.abs(series.mean(axis=0) - error).max() < 0.3 * 4
+    )  # standard error at the loudest phase: 0.27
     assert np.polyfit(error, series.mean(axis=0), 1)[0] == pytest.approx(1, abs=0.05)
     spread = series.reshape(60, 100, 40).std(axis=(0, 1))
     np.testing.assert_allclose(spread, 1.1 + series_signal[:40], atol=0.12)

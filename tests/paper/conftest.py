@@ -4,8 +4,20 @@ from enhsim_tf.common.stages import Stages
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.settings import make_settings
 
-TINY = {"window": 100, "num_samples": 20_000, "hidden_units": 32, "filters": 16, "rows": 60, "num_trees": 20, "fast": False}
-TINY_OPTIONS = [word for name, value in TINY.items() for word in ("--set", f"{name}={'no' if value is False else value}")]
+TINY = {
+    "window": 100,
+    "num_samples": 20_000,
+    "hidden_units": 32,
+    "filters": 16,
+    "rows": 60,
+    "num_trees": 20,
+    "fast": False,
+}
+TINY_OPTIONS = [
+    word
+    for name, value in TINY.items()
+    for word in ("--set", f"{name}={'no' if value is False else value}")
+]
 """The same for the command."""
 
 

@@ -42,8 +42,13 @@ def of_history(**history):
     """A pipeline with a recorded training of 2,000 iterations, every 100."""
     iteration = np.arange(100, 2_001, 100)
     settings = tiny_settings(iterations=1_000, record_every=100, rows=200)
-    arrays = {name: np.broadcast_to(np.asarray(values, float), iteration.shape) for name, values in history.items()}
-    return SimpleNamespace(settings=settings, history={"iteration": iteration, "real_sd": 0.1} | arrays)
+    arrays = {
+        name: np.broadcast_to(np.asarray(values, float), iteration.shape)
+        for name, values in history.items()
+    }
+    return SimpleNamespace(
+        settings=settings, history={"iteration": iteration, "real_sd": 0.1} | arrays
+    )
 
 
 @pytest.mark.parametrize(
@@ -59,7 +64,10 @@ def of_history(**history):
     ],
 )
 def test_basic_limits_decide_first_and_our_hurdles_never(measured, expected):
-    limits = tuple(Limit(name, name, high=1, decides=kind) for name, kind in (("a", BASIC), ("b", WHOLE), ("c", OURS)))
+    limits = tuple(
+        Limit(name, name, high=1, decides=kind)
+        for name, kind in (("a", BASIC), ("b", WHOLE), ("c", OURS))
+    )
     assert verdict(limits, measured) == expected
 
 
@@ -75,14 +83,24 @@ def test_basic_limits_decide_first_and_our_hurdles_never(measured, expected):
         (0.9, 0.3, 0.3, NOT_REPRODUCED),
     ],
 )
-def test_c5_asks_for_a_discriminator_that_is_ahead_and_for_balance(early, late_real, late_generated, expected):
+def test_c5_asks_for_a_discriminator_that_is_ahead_and_for_balance(
+    early, late_real, late_generated, expected
+):
     is_early = np.arange(100, 2_001, 100) <= 500
-    history = {f"accuracy_{kind}": np.where(is_early, early, late) for kind, late in (("real", late_real), ("generated", late_generated))}
-    assert binomial_interval(0.5, 100) == pytest.approx((0.4038, 0.5962), abs=1e-4)  # Wilson's, of a textbook
+    history = {
+        f"accuracy_{kind}": np.where(is_early, early, late)
+        for kind, late in (("real", late_real), ("generated", late_generated))
+    }
+    assert binomial_interval(0.5, 100) == pytest.approx(
+        (0.4038, 0.5962), abs=1e-4
+    )  # Wilson's, of a textbook
     assert verdict(LIMITS["C5"], balance(of_history(**history))) == expected
 
 
-@pytest.mark.parametrize(("settles", "expected"), [(100, PARTLY), (500, REPRODUCED), (1_500, REPRODUCED), (1_600, NOT_REPRODUCED)])
+@pytest.mark.parametrize(
+    ("settles", "expected"),
+    [(100, PARTLY), (500, REPRODUCED), (1_500, REPRODUCED), (1_600, NOT_REPRODUCED)],
+)
 @pytest.mark.parametrize("scale", [0.1, 0.3])  # whether the scale is right is the question of C6
 def test_c4_asks_when_the_noise_stops_changing(settles, expected, scale):
     iteration = np.arange(100, 2_001, 100)
@@ -110,13 +128,17 @@ def failed(measured):
 @pytest.mark.parametrize("lag", [0.5, -0.042])
 def test_c6_fails_white_noise_where_the_noise_is_not_white(lag):
     draws = RNG(2).standard_normal((600, 501))
-    weight = (1 - np.sqrt(1 - 4 * lag**2)) / (2 * lag)  # of a moving average of two samples with this lag-1 correlation
+    weight = (1 - np.sqrt(1 - 4 * lag**2)) / (
+        2 * lag
+    )  # of a moving average of two samples with this lag-1 correlation
     real = (draws[:, 1:] + weight * draws[:, :-1])[:, :200] / np.sqrt(1 + weight**2)
     generated = RNG(3).standard_normal(real.shape)
     assert "lag_one_error" in failed(resemblance(generated, real, real[::-1], seed=0))
 
 
-@pytest.mark.parametrize(("factor", "fails"), [(1.10, set()), (1.2, {"scale_difference", "auc", "marginal_distance"})])
+@pytest.mark.parametrize(
+    ("factor", "fails"), [(1.10, set()), (1.2, {"scale_difference", "auc", "marginal_distance"})]
+)
 def test_c6_allows_real_noise_that_is_ten_per_cent_louder_by_every_measure(factor, fails):
     again = white(seed=3)
     assert failed(resemblance(factor * again, white(seed=2), again, seed=0)) == fails
@@ -141,9 +163,14 @@ def test_the_sign_comes_from_the_claims_that_the_paper_tests(verdicts, sign):
     assert title([*records, {"verdict": "does not hold", "is_tested": False}]) == sign
 
 
-@pytest.mark.parametrize(("value", "is_named"), [(1.0, False), (2.0, False), (-0.05, False), (-0.15, True), (3.15, True), (None, True)])
+@pytest.mark.parametrize(
+    ("value", "is_named"),
+    [(1.0, False), (2.0, False), (-0.05, False), (-0.15, True), (3.15, True), (None, True)],
+)
 def test_a_measurement_outside_the_widened_range_is_named(value, is_named):
-    records = [{"id": "C1", "measured": {} if value is None else {"nrmse": value}}]  # the width of 1, and 5 % of 2, on each side
+    records = [
+        {"id": "C1", "measured": {} if value is None else {"nrmse": value}}
+    ]  # the width of 1, and 5 % of 2, on each side
     lines = outside(records, {"claims": {"C1": {"ranges": {"nrmse": [1.0, 2.0]}}}})
     assert [line.startswith("C1: nrmse") for line in lines] == [True] * is_named
 

@@ -12,12 +12,16 @@ def weights_of(network):
 
 
 def num_moved(network, before):
-    return sum(not np.array_equal(old, new) for old, new in zip(before, weights_of(network), strict=True))
+    return sum(
+        not np.array_equal(old, new) for old, new in zip(before, weights_of(network), strict=True)
+    )
 
 
 def make_gan(**changed):
     settings = tiny_settings(**changed)
-    gan = noise.NoiseGAN(noise.build_generator(settings), noise.build_discriminator(settings), settings)
+    gan = noise.NoiseGAN(
+        noise.build_generator(settings), noise.build_discriminator(settings), settings
+    )
     gan.compile()
     return gan
 
@@ -50,11 +54,24 @@ def test_a_trailing_average_leaves_the_part_of_a_wave_that_its_frequency_respons
 def test_the_networks_are_those_of_figures_9_and_10():
     settings = make_settings()
     generator, discriminator = noise.build_generator(settings), noise.build_discriminator(settings)
-    assert (generator.input_shape, generator.output_shape, generator.count_params()) == ((None, 16), (None, 500, 1), 33_844)
-    assert (discriminator.input_shape, discriminator.output_shape, discriminator.count_params()) == ((None, 500, 1), (None, 1), 23_051)
+    assert (generator.input_shape, generator.output_shape, generator.count_params()) == (
+        (None, 16),
+        (None, 500, 1),
+        33_844,
+    )
+    assert (
+        discriminator.input_shape,
+        discriminator.output_shape,
+        discriminator.count_params(),
+    ) == ((None, 500, 1), (None, 1), 23_051)
     kinds = [type(layer).__name__ for layer in discriminator.layers]
     assert kinds == ["Conv1D", "Dropout", "GlobalMaxPooling1D", "Dense", "Dropout", "Dense"]
-    assert [type(layer).__name__ for layer in generator.layers] == ["Dense", "BatchNormalization", "Dense", "Reshape"]
+    assert [type(layer).__name__ for layer in generator.layers] == [
+        "Dense",
+        "BatchNormalization",
+        "Dense",
+        "Reshape",
+    ]
 
 
 @pytest.mark.parametrize("fast", [False, True])
@@ -62,12 +79,16 @@ def test_a_step_of_one_network_moves_it_alone(fast):
     gan = make_gan(fast=fast, filters=4, rows=10)
     before = weights_of(gan.discriminator), weights_of(gan.generator)
     gan.train_discriminator(tf.constant(real_rows(10)[:, :, None]), noise.labels(10, noise.REAL))
-    assert num_moved(gan.discriminator, before[0]) == 6  # kernel and bias of the convolution and of both Dense layers
+    assert (
+        num_moved(gan.discriminator, before[0]) == 6
+    )  # kernel and bias of the convolution and of both Dense layers
     assert num_moved(gan.generator, before[1]) == 0
     before = weights_of(gan.discriminator), weights_of(gan.generator)
     gan.train_generator()
     assert num_moved(gan.discriminator, before[0]) == 0
-    assert num_moved(gan.generator, before[1]) == 8  # two Dense layers; scale, shift, mean and variance of the normalisation
+    assert (
+        num_moved(gan.generator, before[1]) == 8
+    )  # two Dense layers; scale, shift, mean and variance of the normalisation
 
 
 def test_the_combined_model_can_train_the_weights_of_the_generator_alone_and_the_discriminator_still_learns():
@@ -75,7 +96,9 @@ def test_the_combined_model_can_train_the_weights_of_the_generator_alone_and_the
     before = weights_of(gan.discriminator)
     noise.train_gan(gan, real_rows(), 0, 5)
     assert num_moved(gan.discriminator, before) == 6
-    assert [id(weight) for weight in gan.combined.trainable_weights] == [id(weight) for weight in gan.generator.trainable_weights]
+    assert [id(weight) for weight in gan.combined.trainable_weights] == [
+        id(weight) for weight in gan.generator.trainable_weights
+    ]
 
 
 def cross_entropy(predicted, tag):
@@ -95,13 +118,20 @@ def test_the_losses_are_those_of_figure_11_with_the_label_reversed_for_the_gener
     del gan.train_generator
     p_told_real = np.asarray(judge(gan.generator(latent, training=True)))
     gan.train_generator()
-    assert float(gan.trackers["generator_loss"].result()) == pytest.approx(cross_entropy(p_told_real, 1), rel=1e-5)
+    assert float(gan.trackers["generator_loss"].result()) == pytest.approx(
+        cross_entropy(p_told_real, 1), rel=1e-5
+    )
 
 
-@pytest.mark.parametrize(("update", "rows", "updates"), [("mixed 100 + 100", 30, 1), ("mixed 200 + 200", 60, 1), ("two of 200", 60, 2)])
+@pytest.mark.parametrize(
+    ("update", "rows", "updates"),
+    [("mixed 100 + 100", 30, 1), ("mixed 200 + 200", 60, 1), ("two of 200", 60, 2)],
+)
 def test_each_reading_of_the_update_has_its_number_of_rows_and_updates(update, rows, updates):
     gan, seen = make_gan(update=update), []
-    gan.train_discriminator = lambda data, tags: seen.append((len(data), float(tf.reduce_mean(tags))))
+    gan.train_discriminator = lambda data, tags: seen.append(
+        (len(data), float(tf.reduce_mean(tags)))
+    )
     gan.train_step(tf.constant(real_rows(rows)))
     assert seen == ([(2 * rows, 0.5)] if updates == 1 else [(rows, 1.0), (rows, 0.0)])
 
@@ -117,21 +147,36 @@ def test_fast_training_gives_the_weights_of_plain_keras_where_nothing_is_dropped
 
 
 def test_the_gan_approaches_the_standard_deviation_of_white_noise():
-    gan = make_gan(window=40, rows=64, iterations=600, record_every=100, dropout=0, seed=3, update="mixed 200 + 200")
+    gan = make_gan(
+        window=40,
+        rows=64,
+        iterations=600,
+        record_every=100,
+        dropout=0,
+        seed=3,
+        update="mixed 200 + 200",
+    )
     rows, sds = (0.1 * np.random.default_rng(0).standard_normal((2_000, 40))).astype(np.float32), []
 
     def follow(iteration):
-        sds.append(np.std(noise.generate_noise(gan.generator, 200, gan.settings, np.random.default_rng(1))))
+        sds.append(
+            np.std(noise.generate_noise(gan.generator, 200, gan.settings, np.random.default_rng(1)))
+        )
 
     follow(0)
     noise.train_gan(gan, rows, 0, 600, follow)
     assert sds[0] > 0.4
-    assert 0.05 < np.mean(sds[-3:]) < 0.2  # processors round differently, and a GAN of one seed ends elsewhere
+    assert (
+        0.05 < np.mean(sds[-3:]) < 0.2
+    )  # processors round differently, and a GAN of one seed ends elsewhere
 
 
 def test_the_normalisation_of_an_untrained_generator_removes_the_latent_scale():
     gans = [make_gan(latent_scale=scale) for scale in (1, 4)]
     latents = [gan.draw_latent(50) for gan in gans]
     np.testing.assert_allclose(latents[1], 4 * np.asarray(latents[0]), rtol=1e-6)
-    rows = [np.asarray(gan.generator(latent, training=True)) for gan, latent in zip(gans, latents, strict=True)]
+    rows = [
+        np.asarray(gan.generator(latent, training=True))
+        for gan, latent in zip(gans, latents, strict=True)
+    ]
     np.testing.assert_allclose(rows[1], rows[0], atol=0.02)  # up to the normalisation's epsilon

@@ -12,13 +12,20 @@ from enhsim_tf.paper.settings import Settings
 
 N = 4_000
 VALUES = np.sin(np.arange(N) / 15) + 0.1 * np.random.default_rng(0).standard_normal(N)
-TABLE = pd.DataFrame({"utc": pd.Timestamp("2021-03-04") + pd.to_timedelta(30 * np.arange(N), unit="s"), "volts": VALUES})
+TABLE = pd.DataFrame(
+    {
+        "utc": pd.Timestamp("2021-03-04") + pd.to_timedelta(30 * np.arange(N), unit="s"),
+        "volts": VALUES,
+    }
+)
 
 
 def pipeline(path, column="volts", time="utc"):
     """The pipeline on a file, and the lines that it told."""
     told: list[str] = []
-    return OwnChannel(Settings(), Stages(path.parent / "cache", tell=told.append), None, path, column, time), told
+    return OwnChannel(
+        Settings(), Stages(path.parent / "cache", tell=told.append), None, path, column, time
+    ), told
 
 
 @pytest.fixture
@@ -34,7 +41,9 @@ def test_a_short_gap_is_filled_by_a_straight_line_and_told(written):
     found, told = pipeline(written(TABLE.drop(index=[50, 51])))
     whole, _ = pipeline(written(TABLE))
     before, *filled, after = found.own.values[49:53]
-    np.testing.assert_allclose(filled, [before + (after - before) / 3, before + (after - before) * 2 / 3], rtol=1e-5)
+    np.testing.assert_allclose(
+        filled, [before + (after - before) / 3, before + (after - before) * 2 / 3], rtol=1e-5
+    )
     assert len(found.own.values) == len(whole.own.values) == N
     assert [line for line in told if line.startswith("repaired: gaps")]
 
@@ -62,7 +71,11 @@ def test_a_constant_channel_is_refused(written, refused):
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [(("amperes", "utc"), "'amperes'"), (("volts", "t"), "'t'"), ((None, "utc"), "2 in x.csv (volts, watts)")],
+    [
+        (("amperes", "utc"), "'amperes'"),
+        (("volts", "t"), "'t'"),
+        ((None, "utc"), "2 in x.csv (volts, watts)"),
+    ],
 )
 def test_a_column_that_is_not_there_or_not_named_is_refused(written, refused, arguments, words):
     with refused(words):

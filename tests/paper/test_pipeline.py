@@ -29,7 +29,9 @@ def test_the_whole_paper_runs_and_every_claim_is_judged(records):
 def test_the_sum_is_the_enhanced_signal_plus_generated_noise(pipeline):
     coarse = pipeline.windows("test", 3, "sum")["coarse"]
     noise = pipeline.generate_noise(3, np.random.default_rng(5))
-    np.testing.assert_array_equal(pipeline.combine(coarse, np.random.default_rng(5)), pipeline.enhance(coarse) + noise)
+    np.testing.assert_array_equal(
+        pipeline.combine(coarse, np.random.default_rng(5)), pipeline.enhance(coarse) + noise
+    )
 
 
 def test_a_second_run_takes_every_stage_from_the_cache_and_finds_the_same(records, cache):
@@ -38,7 +40,9 @@ def test_a_second_run_takes_every_stage_from_the_cache_and_finds_the_same(record
     assert all(again.stages.cached.values())
 
 
-def test_a_run_from_nothing_finds_the_same_and_another_reading_trains_only_what_it_touches(pipeline, cache, tmp_path):
+def test_a_run_from_nothing_finds_the_same_and_another_reading_trains_only_what_it_touches(
+    pipeline, cache, tmp_path
+):
     fresh = tiny_pipeline(tmp_path)
     np.testing.assert_array_equal(fresh.history["sd"], pipeline.history["sd"])
     other = tiny_pipeline(tmp_path, latent_scale=4)
@@ -49,11 +53,20 @@ def test_a_run_from_nothing_finds_the_same_and_another_reading_trains_only_what_
 
 
 def test_a_training_that_learnt_nothing_is_named(records, cache, tmp_path, monkeypatch):
-    ranges = {record["id"]: {"ranges": {name: [value, value] for name, value in record["measured"].items()}} for record in records}
+    ranges = {
+        record["id"]: {
+            "ranges": {name: [value, value] for name, value in record["measured"].items()}
+        }
+        for record in records
+    }
     assert outside(records, {"claims": ranges}) == []
     monkeypatch.setattr(NoiseGAN, "train_discriminator", lambda gan, rows, tags: None)
     broken = tiny_pipeline(tmp_path)
-    broken_records = [{"id": claim.id, "measured": claim.measure(broken)} for claim in CLAIMS if claim.id in ("C5", "C6")]
+    broken_records = [
+        {"id": claim.id, "measured": claim.measure(broken)}
+        for claim in CLAIMS
+        if claim.id in ("C5", "C6")
+    ]
     of_gan = {name: ranges[name] for name in ("C5", "C6")}
     named = outside(broken_records, {"claims": of_gan})
     assert any(line.startswith("C5: late_") for line in named)

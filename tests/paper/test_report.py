@@ -12,14 +12,23 @@ from enhsim_tf.paper.claims import CLAIMS, judge
 from enhsim_tf.paper.figures import FIGURES
 from enhsim_tf.paper.settings import Settings
 
-HOSTILE = "\"'><img src=x onerror=alert(1)><script>alert(2)</script></table>{{ 7 * 7 }}&lt;" + "T1_" * 80 + ".npy"
+HOSTILE = (
+    "\"'><img src=x onerror=alert(1)><script>alert(2)</script></table>{{ 7 * 7 }}&lt;"
+    + "T1_" * 80
+    + ".npy"
+)
 LEFT_OPEN = ("meta", "img", "input", "wbr")
 
 
 def found_of(name="the paper's example"):
     """What a run found, with the first claim measured."""
-    limits = {limit.name for limit in CLAIMS[0].limits} | {limit.high for limit in CLAIMS[0].limits if isinstance(limit.high, str)}
-    records = [judge(claim, dict.fromkeys(limits, 0.0421) if claim is CLAIMS[0] else {}) for claim in CLAIMS]
+    limits = {limit.name for limit in CLAIMS[0].limits} | {
+        limit.high for limit in CLAIMS[0].limits if isinstance(limit.high, str)
+    }
+    records = [
+        judge(claim, dict.fromkeys(limits, 0.0421) if claim is CLAIMS[0] else {})
+        for claim in CLAIMS
+    ]
     about = {"budget": "full", "seconds": 41.2, "stages": {name: 30.0}, "from_cache": [name]}
     return report.results(records, "[¬Re]", Settings(), report.read_published(), **about)
 
@@ -29,7 +38,9 @@ def folder(tmp_path_factory):
     """A folder with a stand-in for each figure, as PNG and SVG; of a PNG, only the size is read."""
     folder = tmp_path_factory.mktemp("report")
     for name in FIGURES:
-        (folder / f"{name}.png").write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 1440, 700))
+        (folder / f"{name}.png").write_bytes(
+            b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 1440, 700)
+        )
         (folder / f"{name}.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
     return folder
 
@@ -83,17 +94,27 @@ def test_figures_are_in_the_order_of_their_numbers():
 
 def test_hostile_names_are_escaped(folder, page):
     hostile = read(folder, found_of(HOSTILE))
-    assert [tag for tag, _ in hostile.tags] == [tag for tag, _ in read(folder, found_of("plain")).tags]
-    assert {name for _, attributes in hostile.tags for name in attributes} <= {name for _, attributes in page.tags for name in attributes}
+    assert [tag for tag, _ in hostile.tags] == [
+        tag for tag, _ in read(folder, found_of("plain")).tags
+    ]
+    assert {name for _, attributes in hostile.tags for name in attributes} <= {
+        name for _, attributes in page.tags for name in attributes
+    }
     assert HOSTILE in hostile.words
 
 
 def test_nothing_is_loaded_and_nothing_runs(page, folder):
     assert not page.of("script", "link", "iframe", "object", "embed", "base")
     for _, attributes in page.tags:
-        assert not [name for name in attributes if name.startswith("on") or name in ("srcset", "background", "poster")]
+        assert not [
+            name
+            for name in attributes
+            if name.startswith("on") or name in ("srcset", "background", "poster")
+        ]
         assert attributes.get("src", "data:").startswith("data:")
-    style = re.search(r"<style>(.*?)</style>", (folder / "report.html").read_text(encoding="utf-8"), re.S)[1]
+    style = re.search(
+        r"<style>(.*?)</style>", (folder / "report.html").read_text(encoding="utf-8"), re.S
+    )[1]
     assert not re.search(r"url\(|@import|https?:", style)
     (policy,) = (each["content"] for each in page.of("meta") if "http-equiv" in each)
     assert "default-src 'none'" in policy and "script-src" not in policy
@@ -109,8 +130,21 @@ def test_headings_are_in_order_and_links_lead_to_places(page):
 
 
 def test_what_the_box_shows_is_what_decides():
-    limit = {"name": "x", "words": "x", "value": 0.25, "low": None, "high": 0.1, "decides": "basic", "holds": False}
+    limit = {
+        "name": "x",
+        "words": "x",
+        "value": 0.25,
+        "low": None,
+        "high": 0.1,
+        "decides": "basic",
+        "holds": False,
+    }
     record = {"id": "C1", "short": "s", "verdict": "not reproduced", "deciding": limit}
     rows = report.box([record], {"claims": {"C1": {"verdict": "undecided", "runs": [6, 3, 1]}}})
-    assert list(rows[0].values()) == ["C1 s", "undecided (6/3/1)", "not reproduced", "x: 0.25, needed at most 0.1"]
+    assert list(rows[0].values()) == [
+        "C1 s",
+        "undecided (6/3/1)",
+        "not reproduced",
+        "x: 0.25, needed at most 0.1",
+    ]
     assert all(value in report.as_text(rows) for value in rows[0].values())

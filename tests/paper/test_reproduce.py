@@ -23,18 +23,24 @@ def ran(cache, pipeline, tmp_path_factory):
     """The command at the tiny size, which finds the stages of the pipeline in the cache."""
     judge_all(pipeline)
     out = tmp_path_factory.mktemp("out")
-    code = reproduce.main(["--budget", "smoke", "--cache", str(cache), "--out", str(out), *TINY_OPTIONS])
+    code = reproduce.main(
+        ["--budget", "smoke", "--cache", str(cache), "--out", str(out), *TINY_OPTIONS]
+    )
     return code, out, json.loads((out / "results.json").read_text())
 
 
 def test_every_figure_is_written_and_the_page_shows_it(ran):
     code, out, found = ran
-    assert code == 0 and [row["this run"] for row in found["box"]] == [claim["verdict"] for claim in found["claims"]]
+    assert code == 0 and [row["this run"] for row in found["box"]] == [
+        claim["verdict"] for claim in found["claims"]
+    ]
     page = (out / "report.html").read_text()
     for name in FIGURES:
         assert (out / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
         assert f'id="{name}"' in page and (out / f"{name}.svg").stat().st_size > 1_000
-    assert not re.search(r"<script|https?://(?!arxiv\.org)[^\"]*\"", re.sub(r'src="data:[^"]*"', "", page))
+    assert not re.search(
+        r"<script|https?://(?!arxiv\.org)[^\"]*\"", re.sub(r'src="data:[^"]*"', "", page)
+    )
 
 
 def test_figures_that_a_run_draws_first_need_no_trained_network(tmp_path):
@@ -46,16 +52,24 @@ def test_figures_that_a_run_draws_first_need_no_trained_network(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "different", "code"), [([], ["C1: nrmse"], 1), ([], [], 0), (["--budget", "smoke"], ["C1: nrmse"], 0)]
+    ("arguments", "different", "code"),
+    [([], ["C1: nrmse"], 1), ([], [], 0), (["--budget", "smoke"], ["C1: nrmse"], 0)],
 )
-def test_the_exit_code_says_whether_a_measurement_lies_outside_its_published_range(arguments, different, code, capsys):
+def test_the_exit_code_says_whether_a_measurement_lies_outside_its_published_range(
+    arguments, different, code, capsys
+):
     assert reproduce.conclude(reproduce.parse(arguments), different) == code
     assert ("C1: nrmse" in capsys.readouterr().out) == (code == 1)
 
 
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    [(["--help"], 0), (["--seed", "-1"], 2), (["--only", "fig99"], 2), (["--cache", "README.md/below", "--out", "."], 2)],
+    [
+        (["--help"], 0),
+        (["--seed", "-1"], 2),
+        (["--only", "fig99"], 2),
+        (["--cache", "README.md/below", "--out", "."], 2),
+    ],
 )
 def test_answers_that_need_no_network_import_none(arguments, code):
     program = f"""
@@ -68,12 +82,16 @@ except SystemExit as left:
 print()
 print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} & set(sys.modules)))
 """
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
     assert done.stdout.splitlines()[-1] == f"{code} []", done.stderr
 
 
 def test_control_characters_reach_neither_caption_nor_results():
-    foot = reproduce.foot_of(reproduce.parse(["--telemetry", "a\x1b[31m\u202eb\nc.csv"]), "fig04_enhanced_simulation")
+    foot = reproduce.foot_of(
+        reproduce.parse(["--telemetry", "a\x1b[31m\u202eb\nc.csv"]), "fig04_enhanced_simulation"
+    )
     assert foot.isprintable() and "a?[31m?b?c.csv" in foot and foot.endswith("--only fig04")
 
 
@@ -82,32 +100,86 @@ def test_a_channel_of_ones_own_keeps_its_times_and_is_scaled_by_its_square_wave(
     times = np.datetime64("2021-03-04T05:06:07") + np.arange(4_000) * np.timedelta64(30, "s")
     values = np.sin(np.arange(4_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(4_000)
     table = pd.DataFrame({"utc": times, "volts": values, "amperes": 0.0})
-    table.to_csv(tmp_path / "x.csv", index=False) if kind == "csv" else table.to_parquet(tmp_path / "x.parquet")
-    arguments = ["--telemetry", tmp_path / f"x.{kind}", "--column", "volts", "--time", "utc", "--only", "fig14"]
-    assert reproduce.main([str(each) for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]]) == 0
+    table.to_csv(tmp_path / "x.csv", index=False) if kind == "csv" else table.to_parquet(
+        tmp_path / "x.parquet"
+    )
+    arguments = [
+        "--telemetry",
+        tmp_path / f"x.{kind}",
+        "--column",
+        "volts",
+        "--time",
+        "utc",
+        "--only",
+        "fig14",
+    ]
+    assert (
+        reproduce.main(
+            [
+                str(each)
+                for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]
+            ]
+        )
+        == 0
+    )
     (folder,) = (tmp_path / "cache").iterdir()
     kept = ParquetStore(folder / "telemetry.parquet").read()
     assert (kept.start, kept.interval, len(kept.values)) == ("2021-03-04T05:06:07Z", 30, 4_000)
-    slope, offset = np.polyfit(values, kept.values, 1)  # the pipeline's unit is that of the square wave
+    slope, offset = np.polyfit(
+        values, kept.values, 1
+    )  # the pipeline's unit is that of the square wave
     np.testing.assert_allclose(kept.values, slope * values + offset, atol=1e-5)
 
 
 def test_claims_that_need_the_true_signal_are_not_measured_on_a_channel_of_ones_own(tmp_path):
-    np.save(tmp_path / "x.npy", np.sin(np.arange(4_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(4_000))
+    np.save(
+        tmp_path / "x.npy",
+        np.sin(np.arange(4_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(4_000),
+    )
     arguments = ["--budget", "smoke", *TINY_OPTIONS, "--telemetry", tmp_path / "x.npy"]
-    assert reproduce.main([str(each) for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]]) == 0
+    assert (
+        reproduce.main(
+            [
+                str(each)
+                for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]
+            ]
+        )
+        == 0
+    )
     found = json.loads((tmp_path / "out" / "results.json").read_text())
-    assert {claim["id"] for claim in found["claims"] if claim["verdict"] == NOT_MEASURED} == {"C3", "C8", "C9"}
+    assert {claim["id"] for claim in found["claims"] if claim["verdict"] == NOT_MEASURED} == {
+        "C3",
+        "C8",
+        "C9",
+    }
 
 
 @pytest.mark.parametrize(
     ("stage", "kept"),
-    [pytest.param("enhancer", ["telemetry"], marks=pytest.mark.slow), ("noise GAN", ["telemetry", "enhancer", "enhancement"])],
+    [
+        pytest.param("enhancer", ["telemetry"], marks=pytest.mark.slow),
+        ("noise GAN", ["telemetry", "enhancer", "enhancement"]),
+    ],
 )
-def test_killed_in_training_the_next_run_continues_and_finds_the_same(pipeline, tmp_path, stage, kept):
+def test_killed_in_training_the_next_run_continues_and_finds_the_same(
+    pipeline, tmp_path, stage, kept
+):
     out, cache = tmp_path / "out", tmp_path / "cache"
-    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", "--cache", cache, "--out", out, *TINY_OPTIONS]
-    process = subprocess.Popen([*map(str, command)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    command = [
+        sys.executable,
+        "-m",
+        "enhsim_tf.reproduce",
+        "--budget",
+        "smoke",
+        "--cache",
+        cache,
+        "--out",
+        out,
+        *TINY_OPTIONS,
+    ]
+    process = subprocess.Popen(
+        [*map(str, command)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
     for line in process.stdout:
         if line.startswith(stage):
             process.send_signal(signal.SIGKILL)
@@ -117,5 +189,7 @@ def test_killed_in_training_the_next_run_continues_and_finds_the_same(pipeline, 
     again = tiny_pipeline(cache)
     for claim in CLAIMS:
         if claim.id in ("C1", "C4", "C5", "C6"):  # of both networks
-            assert claim.measure(again) == claim.measure(pipeline), "to the last digit, in another cache"
+            assert claim.measure(again) == claim.measure(pipeline), (
+                "to the last digit, in another cache"
+            )
     assert [name for name, is_cached in again.stages.cached.items() if is_cached] == kept

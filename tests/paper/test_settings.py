@@ -10,7 +10,11 @@ FIELDS = dataclasses.fields(Settings)
 
 
 def changed_by(settings):
-    return {field.name for field in FIELDS if getattr(settings, field.name) != getattr(make_settings(), field.name)}
+    return {
+        field.name
+        for field in FIELDS
+        if getattr(settings, field.name) != getattr(make_settings(), field.name)
+    }
 
 
 @pytest.mark.parametrize(
@@ -29,7 +33,9 @@ def changed_by(settings):
 def test_each_reading_is_one_setting_away_from_the_reference(name, value, is_of_enhancer):
     reading, reference = make_settings(**{name: value}), make_settings()
     assert changed_by(reading) == {name}
-    assert (reading.of("windows", "enhancer") != reference.of("windows", "enhancer")) == is_of_enhancer
+    assert (
+        reading.of("windows", "enhancer") != reference.of("windows", "enhancer")
+    ) == is_of_enhancer
 
 
 @pytest.mark.parametrize(
@@ -71,11 +77,17 @@ def test_every_setting_has_a_source_and_what_the_source_says(field):
 )
 def test_the_reference_is_written_as_ever(stages, checksum):
     written = repr(make_settings().of(*stages.split(", ")))
-    assert zlib.crc32(written.encode()) == checksum, "another text gives another key, so that the stages of former runs are done again"
+    assert zlib.crc32(written.encode()) == checksum, (
+        "another text gives another key, so that the stages of former runs are done again"
+    )
 
 
 def test_a_value_of_the_paper_wins_over_one_of_the_author():
-    assert [row["setting"] for row in decisions() if row["source"] == AUTHOR and row["paper"].replace(",", "").isdigit()] == []
+    assert [
+        row["setting"]
+        for row in decisions()
+        if row["source"] == AUTHOR and row["paper"].replace(",", "").isdigit()
+    ] == []
 
 
 def test_smoke_changes_counts_only():

@@ -4,7 +4,15 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.paper.degraded import MODES, degrade
 from enhsim_tf.paper.square_wave import simulator, square_wave
-from enhsim_tf.paper.telemetry import ParquetStore, Telemetry, cut_windows, make_telemetry, random_starts, split, true_signal
+from enhsim_tf.paper.telemetry import (
+    ParquetStore,
+    Telemetry,
+    cut_windows,
+    make_telemetry,
+    random_starts,
+    split,
+    true_signal,
+)
 from tests.paper.conftest import tiny_settings
 
 SETTINGS = tiny_settings()
@@ -13,7 +21,9 @@ SIGNAL = true_signal(SETTINGS)
 
 def test_the_signal_at_times_worked_out_by_hand():
     # 30 s: a quarter of the rotation and an eighth of a half orbit; 120 s: a quarter of the orbit and a whole rotation
-    np.testing.assert_allclose(SIGNAL(np.array([0.0, 30.0, 120.0])), [0, 0.25 + 0.5 * np.sin(np.pi / 8), 0.5], atol=1e-12)
+    np.testing.assert_allclose(
+        SIGNAL(np.array([0.0, 30.0, 120.0])), [0, 0.25 + 0.5 * np.sin(np.pi / 8), 0.5], atol=1e-12
+    )
 
 
 def test_the_noise_of_the_telemetry_is_white_with_the_standard_deviation_asked_for():
@@ -37,7 +47,9 @@ def test_no_window_lies_in_two_parts_and_no_time_is_lost():
     parts = list(split(telemetry, 100, 25).values())
     for before, after in zip(parts[:-1], parts[1:], strict=True):
         assert after.first - (before.first + len(before.values)) == 100
-    np.testing.assert_array_equal(parts[2].values, telemetry.values[parts[2].first : parts[2].first + len(parts[2].values)])
+    np.testing.assert_array_equal(
+        parts[2].values, telemetry.values[parts[2].first : parts[2].first + len(parts[2].values)]
+    )
 
 
 def test_telemetry_that_is_too_short_is_refused():
@@ -56,16 +68,22 @@ def test_windows_cut_by_hand():
 
 
 def test_a_square_wave_is_high_in_the_first_half_of_its_period():
-    np.testing.assert_array_equal(square_wave(np.array([0, 59, 60, 119, 120]), 120, 0.25), [0.25, 0.25, -0.25, -0.25, 0.25])
+    np.testing.assert_array_equal(
+        square_wave(np.array([0, 59, 60, 119, 120]), 120, 0.25), [0.25, 0.25, -0.25, -0.25, 0.25]
+    )
 
 
 def degraded(signal, time, mode, severity):
-    return degrade(signal, time, mode, severity, (-0.75, 0.75), 120.0, np.random.default_rng(0), 100)
+    return degrade(
+        signal, time, mode, severity, (-0.75, 0.75), 120.0, np.random.default_rng(0), 100
+    )
 
 
 @pytest.mark.parametrize("signal", [SIGNAL, simulator(SETTINGS)])
 @pytest.mark.parametrize("mode", MODES)
-def test_a_mode_without_severity_is_nominal_and_one_with_it_changes_what_follows_the_onset(mode, signal):
+def test_a_mode_without_severity_is_nominal_and_one_with_it_changes_what_follows_the_onset(
+    mode, signal
+):
     time = np.arange(400.0)[None] + np.array([[0.0], [77.0]])
     nominal, mild, hard = (degraded(signal, time, mode, severity) for severity in (0, 1e-9, 0.9))
     np.testing.assert_allclose(nominal, signal(time), atol=1e-12)

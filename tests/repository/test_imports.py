@@ -21,25 +21,47 @@ NOT_TRIED = ("paper", "own_channel", "__main__")
 def modules_without_networks():
     paths = (path.relative_to(PACKAGE).with_suffix("") for path in sorted(PACKAGE.rglob("*.py")))
     names = [".".join(path.parts).removesuffix(".__init__") for path in paths]
-    found = [name for name in names if name.split(".")[0] not in NOT_TRIED and name not in (*WITH_NETWORKS, "__init__")]
+    found = [
+        name
+        for name in names
+        if name.split(".")[0] not in NOT_TRIED and name not in (*WITH_NETWORKS, "__init__")
+    ]
     return [*found, "paper.settings", "paper.telemetry", "paper.square_wave"]
 
 
 def test_modules_without_networks_import_no_tensorflow():
     modules = [f"enhsim_tf.{name}" for name in modules_without_networks()]
     assert len(modules) > 60
-    script = (
-        f"import sys\nfor module in {modules}:\n    __import__(module)\n    assert not {{'tensorflow', 'keras'}} & set(sys.modules), module"
-    )
+    script = f"import sys\nfor module in {modules}:\n    __import__(module)\n    assert not {{'tensorflow', 'keras'}} & set(sys.modules), module"
     ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
 
 
 def test_a_fit_generated_data_scores_and_anomalies_need_no_tensorflow(tmp_path):
-    values = np.sin(np.arange(1_500) / 6) + 0.1 * np.random.default_rng(0).standard_normal((2, 1_500))
+    values = np.sin(np.arange(1_500) / 6) + 0.1 * np.random.default_rng(0).standard_normal(
+        (2, 1_500)
+    )
     np.savetxt(tmp_path / "x.csv", values.T, delimiter=",", header="a,b", comments="")
-    fit = ["fit", "x.csv", "--out", "models", "--window", "64", "--num-windows", "60"]  # a linear map: no network is tried
-    generate = ["generate", "models", "--windows", "9", "--scenario", "stuck:1", "--out", "x.parquet"]
+    fit = [
+        "fit",
+        "x.csv",
+        "--out",
+        "models",
+        "--window",
+        "64",
+        "--num-windows",
+        "60",
+    ]  # a linear map: no network is tried
+    generate = [
+        "generate",
+        "models",
+        "--windows",
+        "9",
+        "--scenario",
+        "stuck:1",
+        "--out",
+        "x.parquet",
+    ]
     score = ["score", "models", "x.csv", "--windows", "40", "--out", "scores.csv"]
     inject = ["inject", "x.csv", "--kinds", "ramp", "--out", "labelled"]
     script = (
@@ -47,7 +69,11 @@ def test_a_fit_generated_data_scores_and_anomalies_need_no_tensorflow(tmp_path):
         "    assert not {'tensorflow', 'keras'} & set(sys.modules), words"
     )
     ended = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
     )
     assert ended.returncode == 0, ended.stderr
 
@@ -62,11 +88,17 @@ def test_a_missing_source_run_or_model_is_said_before_pandas_is_imported(tmp_pat
     ]
     script = f"import sys\nfrom enhsim_tf.__main__ import main\nassert [main(words) for words in {commands}] == [2] * 4\nassert 'pandas' not in sys.modules"
     ended = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
     )
-    assert ended.returncode == 0 and ended.stderr.count("error: ") == 4 and [path.name for path in tmp_path.iterdir()] == ["x.csv"], (
-        ended.stderr
-    )
+    assert (
+        ended.returncode == 0
+        and ended.stderr.count("error: ") == 4
+        and [path.name for path in tmp_path.iterdir()] == ["x.csv"]
+    ), ended.stderr
 
 
 def test_public_names_resolve_to_their_objects():
@@ -75,6 +107,8 @@ def test_public_names_resolve_to_their_objects():
     assert {"EnhancedSimulator", "fit", "score", "update", "InputError"} <= set(enhsim_tf.__all__)
     for name in enhsim_tf.__all__:
         value = getattr(enhsim_tf, name)
-        assert value.__name__ == name and value is getattr(importlib.import_module(value.__module__), name)
+        assert value.__name__ == name and value is getattr(
+            importlib.import_module(value.__module__), name
+        )
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = enhsim_tf.nothing

@@ -51,7 +51,9 @@ def test_a_notebook_that_is_executed_to_be_read_holds_pictures_instead(displayed
     drawn = []
     lesson.slider(drawn.append, "width", range(1, 8, 2), shown=(5, 1), unit="samples")
     assert drawn == [5, 1]
-    assert [thing.data for thing in displayed] == ["*In Jupyter, this cell has a slider for the width (samples). Stored here: 5, 1.*"]
+    assert [thing.data for thing in displayed] == [
+        "*In Jupyter, this cell has a slider for the width (samples). Stored here: 5, 1.*"
+    ]
 
 
 def test_a_study_is_opened_by_its_name():

@@ -29,14 +29,18 @@ def test_the_notebook_is_its_source_executed_at_full_budget(source):
 
 
 def test_no_notebook_is_without_a_source():
-    assert sorted(build.FOLDER.glob("*.ipynb")) == [source.with_suffix(".ipynb") for source in SOURCES]
+    assert sorted(build.FOLDER.glob("*.ipynb")) == [
+        source.with_suffix(".ipynb") for source in SOURCES
+    ]
 
 
 @pytest.fixture
 def tiny(tmp_path):
     """A small source, and beside it the notebook that an execution at full budget writes."""
     source = tmp_path / "99_tiny.py"
-    source.write_text('# %% [markdown]\n# # Tiny\n\n# %%\nopen_study("battery")\n', encoding="utf-8")
+    source.write_text(
+        '# %% [markdown]\n# # Tiny\n\n# %%\nopen_study("battery")\n', encoding="utf-8"
+    )
     notebook = build.read(source)
     notebook.cells[1].execution_count = 1
     notebook.metadata[build.STAMP] = {"budget": build.FULL, "findings": build.findings(source)}
@@ -50,9 +54,18 @@ def tiny(tmp_path):
     [
         (lambda notebook: notebook.cells[1].update(source="other"), "its source has changed"),
         (lambda notebook: notebook.cells[0].update(source="other"), "its source has changed"),
-        (lambda notebook: notebook.cells[1].update(execution_count=None), "a cell was not executed"),
-        (lambda notebook: notebook.metadata[build.STAMP].update(budget=SMOKE), "it was not executed at full budget"),
-        (lambda notebook: notebook.metadata[build.STAMP].update(findings={"battery": "0"}), "the findings that it shows have changed"),
+        (
+            lambda notebook: notebook.cells[1].update(execution_count=None),
+            "a cell was not executed",
+        ),
+        (
+            lambda notebook: notebook.metadata[build.STAMP].update(budget=SMOKE),
+            "it was not executed at full budget",
+        ),
+        (
+            lambda notebook: notebook.metadata[build.STAMP].update(findings={"battery": "0"}),
+            "the findings that it shows have changed",
+        ),
     ],
 )
 def test_a_notebook_that_is_not_its_source_executed_is_found(tiny, change, fault):
@@ -76,14 +89,24 @@ def cache(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "source", [pytest.param(source, id=source.stem, marks=[] if source.stem == QUICK else [pytest.mark.slow]) for source in SOURCES]
+    "source",
+    [
+        pytest.param(
+            source, id=source.stem, marks=[] if source.stem == QUICK else [pytest.mark.slow]
+        )
+        for source in SOURCES
+    ],
 )
 def test_a_lesson_runs_and_its_solutions_are_right(source, cache):
     notebook = build.execute(source, SMOKE, solved=True)
-    checks = [cell for cell in notebook.cells if cell.cell_type == "code" and build.CHECK in cell.source]
+    checks = [
+        cell for cell in notebook.cells if cell.cell_type == "code" and build.CHECK in cell.source
+    ]
     said = {cell.metadata.get("solved", False): set() for cell in checks}
     for cell in checks:
-        said[cell.metadata.get("solved", False)].add("".join(output.text for output in cell.outputs).strip())
+        said[cell.metadata.get("solved", False)].add(
+            "".join(output.text for output in cell.outputs).strip()
+        )
     assert said == {False: {NOT_ANSWERED}, True: {RIGHT}}
 
 
@@ -112,7 +135,9 @@ def test_outputs_are_kept_only_if_no_code_has_changed(tiny):
     assert kept.cells[0].source == "# Small" and kept.cells[1].outputs[0].text == "seen"
     nbformat.write(kept, tiny.with_suffix(".ipynb"))
     assert build.faults(tiny) == []
-    tiny.write_text(tiny.read_text(encoding="utf-8").replace("battery", "factorial"), encoding="utf-8")
+    tiny.write_text(
+        tiny.read_text(encoding="utf-8").replace("battery", "factorial"), encoding="utf-8"
+    )
     with pytest.raises(ValueError, match="99_tiny"):
         build.keep_outputs(tiny)
 
@@ -124,7 +149,10 @@ def test_badges_and_set_up_are_there_with_an_address_and_not_without(tiny, monke
     published = build.keep_outputs(tiny)
     assert [cell.source for cell in without.cells] == ["# Tiny", 'open_study("battery")']
     title, set_up, code = (cell.source for cell in published.cells)
-    assert "colab.research.google.com/github/someone/something/blob/main/notebooks/99_tiny.ipynb" in title
+    assert (
+        "colab.research.google.com/github/someone/something/blob/main/notebooks/99_tiny.ipynb"
+        in title
+    )
     assert "mybinder.org/v2/gh/someone/something/main" in title
     assert ADDRESS in set_up and code == without.cells[1].source
     nbformat.write(published, tiny.with_suffix(".ipynb"))
@@ -137,12 +165,18 @@ def test_the_set_up_fetches_a_clone_and_starts_in_its_lessons(tmp_path):
     elsewhere.mkdir()
     (clone / "notebooks" / "lesson_tools.py").write_text("found = True\n")
     (clone / "requirements.txt").write_text("")
-    for command in (["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-q", "-m", "first"]):
+    for command in (
+        ["init", "-q"],
+        ["add", "."],
+        ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-q", "-m", "first"],
+    ):
         subprocess.run(["git", *command], cwd=clone, check=True)
     code = build.SET_UP_CODE.format(address=clone.as_uri())
     twice = f"{code}\nimport lesson_tools\n{code}\nprint(lesson_tools.found, os.path.basename(os.getcwd()))"
     for _ in range(2):  # a kernel that starts again finds the clone there
-        done = subprocess.run([sys.executable, "-c", twice], cwd=elsewhere, check=True, capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", twice], cwd=elsewhere, check=True, capture_output=True, text=True
+        )
         assert done.stdout.strip().endswith("True notebooks")
 
 
@@ -161,8 +195,12 @@ def test_what_a_lesson_tells_to_see_is_asserted(source):
     cells = build.read(source).cells
     for number, cell in enumerate(cells):
         if "*What to see:*" in cell.source:
-            following = "\n".join(cell.source for cell in cells[number + 1 : number + 3] if cell.cell_type == "code")
-            assert any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(following))), cell.source
+            following = "\n".join(
+                cell.source for cell in cells[number + 1 : number + 3] if cell.cell_type == "code"
+            )
+            assert any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(following))), (
+                cell.source
+            )
 
 
 def test_a_claim_has_the_same_verdict_and_numbers_in_every_lesson():
@@ -174,24 +212,38 @@ def test_a_claim_has_the_same_verdict_and_numbers_in_every_lesson():
                 if found := re.match(r"> \*\*(C\d): (.*?)\.\*\*", text):
                     verdicts.setdefault(found[1], set()).add(found[2])
                     if limits := text[found.end() :].strip():  # a lesson may leave them out
-                        numbers.setdefault(found[1], set()).add(tuple(re.findall(r"\d[\d,.]*", limits)))
+                        numbers.setdefault(found[1], set()).add(
+                            tuple(re.findall(r"\d[\d,.]*", limits))
+                        )
     assert len(verdicts) == 9
     assert all(len(each) == 1 for each in (*verdicts.values(), *numbers.values()))
 
 
 def test_every_figure_and_every_claim_of_the_paper_is_taught():
     everything = "\n".join(code for source in SOURCES for code in code_of(source))
-    figures = [name for name in FIGURES if FIGURES[name].number < 14]  # the paper commented out number 14
-    assert [name for name in (*figures, *(claim.id for claim in CLAIMS)) if f'"{name}"' not in everything] == []
+    figures = [
+        name for name in FIGURES if FIGURES[name].number < 14
+    ]  # the paper commented out number 14
+    assert [
+        name
+        for name in (*figures, *(claim.id for claim in CLAIMS))
+        if f'"{name}"' not in everything
+    ] == []
 
 
 @each_lesson
 def test_pictures_that_the_prose_shows_are_there(source):
     text = "\n".join(cell.source for cell in build.read(source).cells)
-    assert [name for name in re.findall(r"!\[[^]]+\]\((.*?)\)", text) if not (build.FOLDER / name).is_file()] == []
+    assert [
+        name
+        for name in re.findall(r"!\[[^]]+\]\((.*?)\)", text)
+        if not (build.FOLDER / name).is_file()
+    ] == []
 
 
 @each_lesson
 def test_a_notebook_names_no_folder_of_the_machine_that_executed_it(source):
-    text = re.sub(r'"image/png": ".*?"', "", source.with_suffix(".ipynb").read_text(encoding="utf-8"))
+    text = re.sub(
+        r'"image/png": ".*?"', "", source.with_suffix(".ipynb").read_text(encoding="utf-8")
+    )
     assert [name for name in (str(ROOT), "/tmp/", "/home/", "/root/") if name in text] == []

@@ -21,7 +21,9 @@ def smooth_wave(number, phase=0.0):
 
 def series(number=3_000, seed=0, noise_sd=0.1, name="volts"):
     """Telemetry of one channel: the wave around 5, with white noise."""
-    values = 5 + 2 * smooth_wave(number) + noise_sd * np.random.default_rng(seed).standard_normal(number)
+    values = (
+        5 + 2 * smooth_wave(number) + noise_sd * np.random.default_rng(seed).standard_normal(number)
+    )
     return Telemetry(values.astype(np.float32), 10.0, 0.0, "2024-01-01T00:00:00+00:00", name)
 
 
@@ -29,8 +31,16 @@ def joint(number=3_000, seed=0):
     """Two channels whose noise has the correlation 0.8, in different units."""
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal((number, 2)) @ np.linalg.cholesky([[1.0, 0.8], [0.8, 1.0]]).T
-    values = np.stack([5 + 2 * smooth_wave(number), 100 - 30 * smooth_wave(number, 0.25)], axis=1) + noise * (0.2, 3.0)
-    return Recording((Run(values.astype(np.float32)),), ("volts", "watts"), 10.0, "2024-01-01T00:00:00+00:00", "volts, watts")
+    values = np.stack(
+        [5 + 2 * smooth_wave(number), 100 - 30 * smooth_wave(number, 0.25)], axis=1
+    ) + noise * (0.2, 3.0)
+    return Recording(
+        (Run(values.astype(np.float32)),),
+        ("volts", "watts"),
+        10.0,
+        "2024-01-01T00:00:00+00:00",
+        "volts, watts",
+    )
 
 
 @pytest.fixture(scope="session")
@@ -49,7 +59,13 @@ def coarse_run(number=3_000, start="2024-01-01T00:00:00+00:00"):
     """A recorded run of the square wave that `series` smooths."""
     square = np.sign(np.sin(2 * np.pi * (np.arange(number) + 4) / PERIOD + 1e-6))
     ramp = np.linspace(0, 1, number)
-    return Recording((Run(np.stack([square, ramp], axis=1).astype(np.float32)),), ("square", "ramp"), 10.0, start, "the run")
+    return Recording(
+        (Run(np.stack([square, ramp], axis=1).astype(np.float32)),),
+        ("square", "ramp"),
+        10.0,
+        start,
+        "the run",
+    )
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,12 @@ PLACES = np.arange(200)
 
 @pytest.fixture
 def waves():
-    return Waves([SquareWaveSimulator([SquareWave(40.0, low=1.0, high=3.0)]), ConstantLevel(7.0, 2.0)], ("a", "b"), 1.0, 80)
+    return Waves(
+        [SquareWaveSimulator([SquareWave(40.0, low=1.0, high=3.0)]), ConstantLevel(7.0, 2.0)],
+        ("a", "b"),
+        1.0,
+        80,
+    )
 
 
 def square(places):
@@ -24,14 +29,23 @@ def square(places):
 
 
 def test_phase_offset_and_gain_of_windows_are_recovered(waves):
-    starts, shift, gain = np.array([3, 11, 30]), np.array([10.0, -2.0, 0.5]), np.array([2.0, 1.0, 5.0])
+    starts, shift, gain = (
+        np.array([3, 11, 30]),
+        np.array([10.0, -2.0, 0.5]),
+        np.array([2.0, 1.0, 5.0]),
+    )
     wave = square(starts[:, None] + np.arange(80))
-    targets = np.stack([shift[:, None] + gain[:, None] * wave, np.full((3, 80), 4.0)], axis=2).astype(np.float32)
+    targets = np.stack(
+        [shift[:, None] + gain[:, None] * wave, np.full((3, 80), 4.0)], axis=2
+    ).astype(np.float32)
     coarse, found_shift, found_gain = waves.align(targets)
     np.testing.assert_array_equal(coarse[:, :, 0], wave)
     np.testing.assert_allclose(found_shift, np.stack([shift, np.full(3, 4.0)], axis=1), atol=1e-5)
     np.testing.assert_allclose(found_gain, np.stack([gain, np.full(3, 2.0)], axis=1), atol=1e-5)
-    assert waves.is_flat(np.array([[0.09, 2.0], [0.11, 2.0]])).tolist() == [[True, False], [False, False]]  # the wave's amplitude is 1
+    assert waves.is_flat(np.array([[0.09, 2.0], [0.11, 2.0]])).tolist() == [
+        [True, False],
+        [False, False],
+    ]  # the wave's amplitude is 1
 
 
 def test_the_phase_of_short_pulses_is_found_although_some_windows_have_none():
@@ -51,15 +65,27 @@ def test_enhanced_waveforms_find_the_phase(waves):
     np.testing.assert_array_equal(coarse[:, :, 0], waves.phases(0)[[10, 130]])
 
 
-@pytest.mark.parametrize(("period", "expected"), [(40.2, 40.0), (41.0, 41.0)])  # two per cent apart they keep their clocks
+@pytest.mark.parametrize(
+    ("period", "expected"), [(40.2, 40.0), (41.0, 41.0)]
+)  # two per cent apart they keep their clocks
 def test_nearly_equal_periods_become_one_clock_at_the_distance_of_the_telemetry(period, expected):
-    first, second = (SquareWaveSimulator([SquareWave(each, phase)]) for each, phase in ((40.0, 0.1), (period, 0.9)))
+    first, second = (
+        SquareWaveSimulator([SquareWave(each, phase)])
+        for each, phase in ((40.0, 0.1), (period, 0.9))
+    )
     times = np.arange(0, 4_000, 37)[:, None] + np.arange(80)
-    targets = np.stack([SquareWave(40.0, phase)(times) for phase in (0.3, 0.55)], axis=2).astype(np.float32)  # a quarter of a period apart
-    found = [each.waves[0] for each in Waves([first, second], ("a", "b"), 1.0, 80).on_one_clock(targets).simulators]
+    targets = np.stack([SquareWave(40.0, phase)(times) for phase in (0.3, 0.55)], axis=2).astype(
+        np.float32
+    )  # a quarter of a period apart
+    found = [
+        each.waves[0]
+        for each in Waves([first, second], ("a", "b"), 1.0, 80).on_one_clock(targets).simulators
+    ]
     assert [each.period_s for each in found] == [40.0, expected]
     if expected == 40.0:
-        assert np.mod(found[1].phase - found[0].phase, 1.0) == pytest.approx(0.25, abs=0.0125)  # half a sample
+        assert np.mod(found[1].phase - found[0].phase, 1.0) == pytest.approx(
+            0.25, abs=0.0125
+        )  # half a sample
 
 
 def test_waves_are_drawn_in_their_unit_and_a_scenario_may_concern_one_channel(waves):
@@ -67,15 +93,26 @@ def test_waves_are_drawn_in_their_unit_and_a_scenario_may_concern_one_channel(wa
     nominal = waves.draw(starts, [None] * 3, rng)
     assert nominal.coarse is nominal.nominal and not nominal.coarse[:, :, 1].any()
     np.testing.assert_array_equal(nominal.coarse[:, :, 0], square(starts[:, None] + np.arange(80)))
-    found = waves.draw(starts, [None, Degraded("stuck", 1.0, 0.25, "b"), Degraded("drift", 1.0, 0.0, "b")], rng)
-    assert (found.coarse != found.nominal).any(axis=1).tolist() == [[False, False], [False, False], [False, True]]  # a level stands anyway
-    assert found.coarse[2, -1, 1] == pytest.approx(2.0)  # the whole range of a level of spread 2, in units of the spread
+    found = waves.draw(
+        starts, [None, Degraded("stuck", 1.0, 0.25, "b"), Degraded("drift", 1.0, 0.0, "b")], rng
+    )
+    assert (found.coarse != found.nominal).any(axis=1).tolist() == [
+        [False, False],
+        [False, False],
+        [False, True],
+    ]  # a level stands anyway
+    assert found.coarse[2, -1, 1] == pytest.approx(
+        2.0
+    )  # the whole range of a level of spread 2, in units of the spread
     assert (found.held != np.arange(80)[:, None]).sum(axis=1).tolist() == [[0, 0], [0, 59], [0, 0]]
     with pytest.raises(InputError, match="one of: a, b"):
         waves.draw(np.array([0]), [Degraded("drift", 1.0, 0.0, "c")], rng)
 
 
-@pytest.mark.parametrize(("mode", "begin", "end", "still"), [(("stuck", 1.0, 0.5, "a"), 0, 100, 50), (("stuck", 1.0, 0.0), 30, 50, 30)])
+@pytest.mark.parametrize(
+    ("mode", "begin", "end", "still"),
+    [(("stuck", 1.0, 0.5, "a"), 0, 100, 50), (("stuck", 1.0, 0.0), 30, 50, 30)],
+)
 def test_a_series_is_drawn_with_what_stands_still(waves, mode, begin, end, still):
     held = np.where((PLACES >= still) & (PLACES < end), still, PLACES)
     drawn = waves.draw_series(200, [(Degraded(*mode), begin, end)], np.random.default_rng(0))
@@ -85,7 +122,9 @@ def test_a_series_is_drawn_with_what_stands_still(waves, mode, begin, end, still
 
 
 def test_each_part_of_telemetry_meets_the_run_of_its_own_time():
-    first, second = (np.random.default_rng(seed).standard_normal((100, 1)).astype(np.float32) for seed in (0, 1))
+    first, second = (
+        np.random.default_rng(seed).standard_normal((100, 1)).astype(np.float32) for seed in (0, 1)
+    )
     telemetry = Recording((Run(first, 0.0), Run(second, 1_500.0)), ("a",), 10.0, START)
     values = coarse_run(300).parts[0].values
     late = dataclasses.replace(coarse_run(300), parts=(Run(values[50:], 500.0),))
@@ -94,7 +133,11 @@ def test_each_part_of_telemetry_meets_the_run_of_its_own_time():
         np.testing.assert_array_equal(part.values, expected)
     for part, expected in zip(coarse.parts, (values[50:98], values[148:248]), strict=True):
         np.testing.assert_allclose(part.values, expected, atol=1e-6)
-    assert [part.offset_s for part in found.parts] == [part.offset_s for part in coarse.parts] == [520.0, 1_500.0]
+    assert (
+        [part.offset_s for part in found.parts]
+        == [part.offset_s for part in coarse.parts]
+        == [520.0, 1_500.0]
+    )
 
 
 def test_a_run_of_another_rate_or_without_a_window_is_refused():
@@ -109,5 +152,9 @@ def test_a_run_of_another_rate_or_without_a_window_is_refused():
 
 def test_windows_of_a_run_begin_again_after_the_last():
     values = coarse_run(100).parts[0].values
-    drawn = Runs(coarse_run(100), 80).draw(np.array([0, 20, 21, 43]), [None] * 4, np.random.default_rng(0))
-    np.testing.assert_array_equal(drawn.coarse, [values[:80], values[20:], values[:80], values[1:81]])
+    drawn = Runs(coarse_run(100), 80).draw(
+        np.array([0, 20, 21, 43]), [None] * 4, np.random.default_rng(0)
+    )
+    np.testing.assert_array_equal(
+        drawn.coarse, [values[:80], values[20:], values[:80], values[1:81]]
+    )

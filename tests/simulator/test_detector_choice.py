@@ -1,11 +1,19 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.simulator.detector_choice import RELATIONS, JudgedDetector, anomalous_windows, choose_detector, relation_anomalies
+from enhsim_tf.simulator.detector_choice import (
+    RELATIONS,
+    JudgedDetector,
+    anomalous_windows,
+    choose_detector,
+    relation_anomalies,
+)
 
 
 def detector(name, false_alarms=0.01, recall=0.5, relation=None):
-    return JudgedDetector(name, false_alarms, 0.03, recall, {} if relation is None else {RELATIONS[0]: relation})
+    return JudgedDetector(
+        name, false_alarms, 0.03, recall, {} if relation is None else {RELATIONS[0]: relation}
+    )
 
 
 @pytest.mark.parametrize(
@@ -19,7 +27,10 @@ def detector(name, false_alarms=0.01, recall=0.5, relation=None):
             [detector("a", recall=0.5, relation=0.1), detector("b", recall=0.4, relation=0.9)],
             "b",
         ),  # only the second is near the best in both
-        ([detector("a", recall=0.9, relation=0.1), detector("b", recall=0.5, relation=0.8)], "b"),  # neither is: 1.0 and 1.3
+        (
+            [detector("a", recall=0.9, relation=0.1), detector("b", recall=0.5, relation=0.8)],
+            "b",
+        ),  # neither is: 1.0 and 1.3
     ],
 )
 def test_the_rule_by_hand(judged, expected):
@@ -28,16 +39,26 @@ def test_the_rule_by_hand(judged, expected):
 
 def test_relation_anomalies_keep_the_values_of_every_channel():
     windows = np.random.default_rng(0).standard_normal((10, 40, 3))
-    for found in relation_anomalies(windows, np.zeros_like(windows), np.random.default_rng(1)).values():
+    for found in relation_anomalies(
+        windows, np.zeros_like(windows), np.random.default_rng(1)
+    ).values():
         changed = (found != windows).any(axis=1)
         assert (changed.sum(axis=1) == 1).all()
-        pool = {tuple(np.sort(windows[row, :, channel])) for row in range(10) for channel in range(3)}
-        assert all(tuple(np.sort(found[row, :, channel])) in pool for row, channel in np.argwhere(changed))
+        pool = {
+            tuple(np.sort(windows[row, :, channel])) for row in range(10) for channel in range(3)
+        }
+        assert all(
+            tuple(np.sort(found[row, :, channel])) in pool for row, channel in np.argwhere(changed)
+        )
 
 
 def test_a_lost_relation_of_two_channels_is_found_by_the_innovation(both):
     judged = {each["name"]: each for each in both[1].detectors}
-    assert judged["innovation"]["by_kind"]["another time"] > 0.9 > judged["largest step"]["by_kind"]["another time"] + 0.5
+    assert (
+        judged["innovation"]["by_kind"]["another time"]
+        > 0.9
+        > judged["largest step"]["by_kind"]["another time"] + 0.5
+    )
     assert all(each["false_alarms"] <= 0.05 for each in both[1].detectors)
 
 

@@ -22,7 +22,10 @@ LAGS = (-30, -15, -5, 0, 5, 15, 30)
 
 def process(number, memory, rng):
     """An autoregression of order 1 with a standard deviation of 1."""
-    return np.sqrt(1 - memory**2) * lfilter([1.0], [1.0, -memory], rng.standard_normal(number + 2_000))[2_000:]
+    return (
+        np.sqrt(1 - memory**2)
+        * lfilter([1.0], [1.0, -memory], rng.standard_normal(number + 2_000))[2_000:]
+    )
 
 
 def static_mixing(waves, rng):
@@ -53,7 +56,10 @@ SYSTEMS = (static_mixing, delayed_coupling, common_drift, coupling_by_signal)
 
 def telemetry_of(system, seed, number=NUM_SAMPLES):
     """Waves, what couples the channels, and noise of their own, float32 of shape `(samples, channels)`."""
-    phase, rng = 2 * np.pi * np.arange(number)[:, None] / PERIOD, np.random.default_rng([seed, SYSTEMS.index(system)])
+    phase, rng = (
+        2 * np.pi * np.arange(number)[:, None] / PERIOD,
+        np.random.default_rng([seed, SYSTEMS.index(system)]),
+    )
     waves = np.array([1.0, 0.6, 0.8]) * np.sin(phase + np.array([0.0, 1.0, 2.0]))
     return (waves + system(waves, rng) + 0.15 * rng.standard_normal(waves.shape)).astype(np.float32)
 
@@ -61,7 +67,9 @@ def telemetry_of(system, seed, number=NUM_SAMPLES):
 def windows_of(values, window):
     """Windows that share no sample, with gaps between them so that they begin at all phases of the wave, as generated ones do."""
     starts = np.arange(0, len(values) - window + 1, window + 37)
-    return np.lib.stride_tricks.sliding_window_view(values, window, axis=0)[starts].transpose(0, 2, 1)
+    return np.lib.stride_tricks.sliding_window_view(values, window, axis=0)[starts].transpose(
+        0, 2, 1
+    )
 
 
 def relations(noise, clean):
@@ -74,7 +82,9 @@ def relations(noise, clean):
     found = []
     for first, second in ((0, 1), (0, 2), (1, 2)):
         for lag in LAGS:
-            here, there = (slice(max(each, 0), rest.shape[1] + min(each, 0)) for each in (lag, -lag))
+            here, there = (
+                slice(max(each, 0), rest.shape[1] + min(each, 0)) for each in (lag, -lag)
+            )
             product = rest[:, here, first] * rest[:, there, second]
             found += [product.mean(), (product * sign[:, here]).mean()]
     return np.append(found, np.corrcoef((noise + clean).mean(axis=1).T)[np.triu_indices(3, 1)])
@@ -83,7 +93,12 @@ def relations(noise, clean):
 @pytest.fixture(scope="module", params=SYSTEMS, ids=lambda system: system.__name__)
 def fitted(request):
     values = telemetry_of(request.param, 1)
-    return request.param, fit({name: Telemetry(values[:, channel].copy(), 1.0, name=name) for channel, name in enumerate("abc")})[0]
+    return request.param, fit(
+        {
+            name: Telemetry(values[:, channel].copy(), 1.0, name=name)
+            for channel, name in enumerate("abc")
+        }
+    )[0]
 
 
 def test_generated_noise_keeps_the_relations_of_the_channels(fitted):
@@ -94,11 +109,16 @@ def test_generated_noise_keeps_the_relations_of_the_channels(fitted):
         clean = simulator.enhance(*simulator.alignment.align(windows))
         return relations(windows - clean, clean)
 
-    true = real(1_000, 20 * NUM_SAMPLES)  # of very much real noise; the floor is that of as much as the fit had
+    true = real(
+        1_000, 20 * NUM_SAMPLES
+    )  # of very much real noise; the floor is that of as much as the fit had
     clean = simulator.generate(2_000, seed=1, with_noise=False)
     apart = np.abs(relations(simulator.draw_noise(clean, np.random.default_rng(4)), clean) - true)
     floors = [np.abs(real(seed) - true) for seed in range(10, 18)]
-    noise, levels = (apart[some].max() / np.mean([each[some].max() for each in floors]) for some in (slice(0, -3), slice(-3, None)))
+    noise, levels = (
+        apart[some].max() / np.mean([each[some].max() for each in floors])
+        for some in (slice(0, -3), slice(-3, None))
+    )
     assert levels <= 3 and noise <= 3
 
 
@@ -106,12 +126,18 @@ def test_a_channel_of_another_time_is_found_and_nominal_telemetry_is_not(fitted)
     system, simulator = fitted
     scorer, window = Scorer(simulator, ScoreOptions(false_alarm_rate=RATE)), simulator.window
     new, rng = telemetry_of(system, 2, 3 * NUM_SAMPLES), np.random.default_rng(3)
-    assert np.mean(scorer.score_series(new) > 1) <= 0.03  # of a single record of telemetry; thresholds are set for 1 %
+    assert (
+        np.mean(scorer.score_series(new) > 1) <= 0.03
+    )  # of a single record of telemetry; thresholds are set for 1 %
     limit = np.quantile(scorer.score_windows(windows_of(new, window)), 1 - RATE)
     begins = rng.integers(0, len(new) // 2 - window, NUM_FAULTS)
     others = begins + PERIOD * rng.integers(20, len(new) // (2 * PERIOD), NUM_FAULTS)
     faulty = np.stack([new[begin : begin + window] for begin in begins])
-    for number, (other, channel) in enumerate(zip(others, rng.integers(0, 3, NUM_FAULTS), strict=True)):
+    for number, (other, channel) in enumerate(
+        zip(others, rng.integers(0, 3, NUM_FAULTS), strict=True)
+    ):
         faulty[number, :, channel] = new[other : other + window, channel]
     recall = np.mean(scorer.score_windows(faulty) > limit)
-    assert recall >= 0.9 if system in (static_mixing, delayed_coupling) else recall > 3 * RATE  # more than models of single channels find
+    assert (
+        recall >= 0.9 if system in (static_mixing, delayed_coupling) else recall > 3 * RATE
+    )  # more than models of single channels find

@@ -3,7 +3,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from enhsim_tf.simulator.operating_point import beyond, changed_properties, find_departure, lasting, measured
+from enhsim_tf.simulator.operating_point import (
+    beyond,
+    changed_properties,
+    find_departure,
+    lasting,
+    measured,
+)
 
 
 @pytest.mark.parametrize(
@@ -13,7 +19,10 @@ from enhsim_tf.simulator.operating_point import beyond, changed_properties, find
         ([0] * 20 + [1] * 79, None),  # seven windows and nine tenths
         ([1] * 100, 0),
         ([1] + [0] * 19 + [1] * 80, 20),  # an alarm of one sample before
-        ([1] * 10 + [0] * 20 + [1] * 270, 30),  # nine tenths of all are flagged, but not of the eight windows after the alarm
+        (
+            [1] * 10 + [0] * 20 + [1] * 270,
+            30,
+        ),  # nine tenths of all are flagged, but not of the eight windows after the alarm
         ([0] * 10 + [1] * 70 + [0] * 20, None),  # it has gone back
         ([0] * 10 + ([1] * 9 + [0]) * 9, 10),  # nine tenths are flagged
     ],
@@ -42,9 +51,15 @@ def waves(wave, number, noise_sd, seed, **changed):
     """Eight hundred samples of waves of period 40, at other phases, in noise; the last channel is changed."""
     rng, columns = np.random.default_rng(seed), []
     for channel in range(number):
-        own = {"form": wave, "level": 5.0, "amplitude": 1.0, "period": 40.0, "delay": 0.0} | (changed if channel == number - 1 else {})
+        own = {"form": wave, "level": 5.0, "amplitude": 1.0, "period": 40.0, "delay": 0.0} | (
+            changed if channel == number - 1 else {}
+        )
         cycle = (np.arange(800) + 100 * seed - 7 * channel - own["delay"]) / own["period"]
-        columns.append(own["level"] + own["amplitude"] * FORMS[own["form"]](cycle) + noise_sd * rng.standard_normal(800))
+        columns.append(
+            own["level"]
+            + own["amplitude"] * FORMS[own["form"]](cycle)
+            + noise_sd * rng.standard_normal(800)
+        )
     return np.stack(columns, axis=1)
 
 
@@ -62,22 +77,37 @@ def test_each_change_alone_is_named_with_its_channel(form, noise_sd, number):
     old = measured([waves(form, number, noise_sd, 0)], 400, np.arange(0, 401, 40))
     for change in changes:
         new = measured([waves(form, number, noise_sd, 1, **change)], 400, np.arange(0, 401, 40))
-        name = "channel relation" if change in ({"amplitude": -1.0}, {"delay": 10.0}) else next(iter(change)).replace("form", "shape")
+        name = (
+            "channel relation"
+            if change in ({"amplitude": -1.0}, {"delay": 10.0})
+            else next(iter(change)).replace("form", "shape")
+        )
         expected = name if number == 1 else f"{name} of watts"
         assert changed_properties(old, new, CHANNELS[:number]) == (expected,), change
 
 
 def test_a_relation_of_two_channels_names_both_and_many_channels_are_counted():
-    old, new = (measured([waves("sine", 2, 0.1, seed, amplitude=size)], 400, np.arange(400)) for seed, size in ((0, 1.0), (1, -1.0)))
-    assert changed_properties(old, new, ("volts", "amps")) == ("channel relation of volts and amps",)
-    old, new = (measured([np.tile(waves("sine", 1, 0.1, 0) + level, 5)], 400, np.arange(400)) for level in (0.0, 1.0))
+    old, new = (
+        measured([waves("sine", 2, 0.1, seed, amplitude=size)], 400, np.arange(400))
+        for seed, size in ((0, 1.0), (1, -1.0))
+    )
+    assert changed_properties(old, new, ("volts", "amps")) == (
+        "channel relation of volts and amps",
+    )
+    old, new = (
+        measured([np.tile(waves("sine", 1, 0.1, 0) + level, 5)], 400, np.arange(400))
+        for level in (0.0, 1.0)
+    )
     assert changed_properties(old, new, tuple("abcde")) == ("level of 5 channels",)
 
 
 def test_samples_nearest_to_windows_beyond_the_limits_are_marked():
     series = np.zeros((60, 1))
     series[40:] = 3.0
-    low, high = np.full(6, -20.0), np.array([2.0, *[20.0] * 5])  # of the level alone; of one channel, the relation are two more numbers
+    low, high = (
+        np.full(6, -20.0),
+        np.array([2.0, *[20.0] * 5]),
+    )  # of the level alone; of one channel, the relation are two more numbers
     np.testing.assert_array_equal(
         np.flatnonzero(beyond(series, low, high, 10)), np.arange(43, 60)
     )  # half of the window 35 to 45 is no more than 1.5
@@ -97,14 +127,22 @@ def departed(level, amplitude, scored):
         channels=("volts",),
     )
     scores = np.where(np.arange(1_600) < 800, 0.5, scored)
-    return find_departure(simulator, lambda moved: moved[:, 0], scores, [(0, series[:1_000]), (1_000, series[1_000:])]), wave
+    return find_departure(
+        simulator, lambda moved: moved[:, 0], scores, [(0, series[:1_000]), (1_000, series[1_000:])]
+    ), wave
 
 
 def test_scores_after_a_departure_are_those_of_telemetry_moved_back():
     found, wave = departed(level=3.0, amplitude=2.0, scored=2.0)
-    assert 780 <= found.begin <= 800 and found.what == ("level", "amplitude") and found.settled == found.begin + 40
+    assert (
+        780 <= found.begin <= 800
+        and found.what == ("level", "amplitude")
+        and found.settled == found.begin + 40
+    )
     np.testing.assert_allclose(found.scores[: found.begin], 0.5)
-    np.testing.assert_allclose(found.scores[800:], wave, atol=1e-5)  # the score here is the telemetry itself
+    np.testing.assert_allclose(
+        found.scores[800:], wave, atol=1e-5
+    )  # the score here is the telemetry itself
 
 
 # windows of nominal telemetry all have the level 0 and the standard deviation .707, of which a tenth is allowed on each side
@@ -120,19 +158,34 @@ def test_scores_after_a_departure_are_those_of_telemetry_moved_back():
         (0.0, 0.88, True),
     ],
 )
-def test_telemetry_that_is_not_flagged_has_left_beyond_a_tenth_of_its_amplitude(level, amplitude, leaves):
+def test_telemetry_that_is_not_flagged_has_left_beyond_a_tenth_of_its_amplitude(
+    level, amplitude, leaves
+):
     found, _ = departed(level, amplitude, scored=0.5)
     assert (found is not None) == leaves and (not leaves or 790 <= found.begin <= 810)
 
 
-@pytest.mark.parametrize(("change", "what"), [({"level": 6.0}, "level"), ({"period": 48.0}, "period"), ({"period": 32.0}, "period")])
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [({"level": 6.0}, "level"), ({"period": 48.0}, "period"), ({"period": 32.0}, "period")],
+)
 def test_windows_shorter_than_a_period_show_a_departure_that_is_not_flagged(change, what):
     alignment = SimpleNamespace(longest_period=40.0)
-    judged = {"judged_series": lambda telemetry, run: [telemetry], "is_run_model": False, "alignment": alignment}
-    simulator = SimpleNamespace(window=20, nominal=waves("sine", 1, 0.1, 0), nominal_run=None, channels=("volts",), **judged)
+    judged = {
+        "judged_series": lambda telemetry, run: [telemetry],
+        "is_run_model": False,
+        "alignment": alignment,
+    }
+    simulator = SimpleNamespace(
+        window=20, nominal=waves("sine", 1, 0.1, 0), nominal_run=None, channels=("volts",), **judged
+    )
     series = np.concatenate([waves("sine", 1, 0.1, 1), waves("sine", 1, 0.1, 2, **change)])
-    found = find_departure(simulator, lambda moved: np.zeros(len(moved)), np.zeros(1_600), [(0, series)])
-    assert found.what == (what,) and 740 <= found.begin <= 840  # half a window of two periods on either side
+    found = find_departure(
+        simulator, lambda moved: np.zeros(len(moved)), np.zeros(1_600), [(0, series)]
+    )
+    assert (
+        found.what == (what,) and 740 <= found.begin <= 840
+    )  # half a window of two periods on either side
 
 
 def test_a_simulator_without_nominal_telemetry_names_the_shape():

@@ -33,8 +33,14 @@ def again(part):
 @pytest.mark.parametrize("name", NOISES)
 def test_a_saved_noise_model_generates_the_same_noise(name):
     model = fit_noise(name, WINDOWS, CLEAN)
-    for number, signal, draw in ((6, CLEAN[:6], "generate"), (90, np.zeros((90, 2)), "generate_series")):
-        first, second = (getattr(each, draw)(number, np.random.default_rng(1), signal) for each in (model, again(model)))
+    for number, signal, draw in (
+        (6, CLEAN[:6], "generate"),
+        (90, np.zeros((90, 2)), "generate_series"),
+    ):
+        first, second = (
+            getattr(each, draw)(number, np.random.default_rng(1), signal)
+            for each in (model, again(model))
+        )
         np.testing.assert_array_equal(first, second)
 
 
@@ -46,20 +52,43 @@ def test_a_saved_enhancer_predicts_the_same(name):
     np.testing.assert_array_equal(made.predict(CLEAN), enhancer.predict(CLEAN))
 
 
-@pytest.mark.parametrize("part", [SquareWaveSimulator([SquareWave(9.0, 0.1, 0.3, -2.0, 3.0)] * 2), ConstantLevel(2.0, 0.5, 7.0)])
+@pytest.mark.parametrize(
+    "part",
+    [SquareWaveSimulator([SquareWave(9.0, 0.1, 0.3, -2.0, 3.0)] * 2), ConstantLevel(2.0, 0.5, 7.0)],
+)
 def test_saved_waves_and_levels_are_the_same(part):
     times = np.arange(30.0)[None]
     made = again(Waves([part], ["a"], 2.0, 40, [None]))
-    assert (made.channels, made.interval_s, made.window, made.waveforms) == (("a",), 2.0, 40, (None,))
+    assert (made.channels, made.interval_s, made.window, made.waveforms) == (
+        ("a",),
+        2.0,
+        40,
+        (None,),
+    )
     np.testing.assert_array_equal(made.simulators[0].simulate(times), part.simulate(times))
     assert made.simulators[0].waves == part.waves and made.simulators[0].levels == part.levels
 
 
 def test_saved_runs_are_the_same():
-    recording = Recording((Run(WINDOWS[0]), Run(WINDOWS[1], 90.0)), ("a", "b"), 2.0, "2024-01-01T00:00:00+00:00", "a box")
+    recording = Recording(
+        (Run(WINDOWS[0]), Run(WINDOWS[1], 90.0)),
+        ("a", "b"),
+        2.0,
+        "2024-01-01T00:00:00+00:00",
+        "a box",
+    )
     made = again(Runs(recording, 40, 3.0, "a heater", CommandTraces([(2, 8.0)])))
-    assert (made.window, made.delay_s, made.name, made.commands.chosen) == (40, 3.0, "a heater", ((2, 8.0),))
-    assert (made.columns, made.nominal.start, made.nominal.name) == (("a", "b"), recording.start, "a box")
+    assert (made.window, made.delay_s, made.name, made.commands.chosen) == (
+        40,
+        3.0,
+        "a heater",
+        ((2, 8.0),),
+    )
+    assert (made.columns, made.nominal.start, made.nominal.name) == (
+        ("a", "b"),
+        recording.start,
+        "a box",
+    )
     for part, expected in zip(made.nominal.parts, recording.parts, strict=True):
         assert part.offset_s == expected.offset_s
         np.testing.assert_array_equal(part.values, expected.values)

@@ -18,9 +18,13 @@ def folder(tmp_path, monkeypatch):
     watts = np.convolve(rng.standard_normal(2_000), np.hanning(20), "same")
     run = pd.DataFrame({"time": times, "watts": watts})
     run.to_csv(tmp_path / "simulator.csv", index=False)
-    run.iloc[:300].assign(watts=0.5 * watts[:300], scenario="weak heater").to_csv(tmp_path / "fault_run.csv", index=False)
+    run.iloc[:300].assign(watts=0.5 * watts[:300], scenario="weak heater").to_csv(
+        tmp_path / "fault_run.csv", index=False
+    )
     measured = 20 + watts + 0.1 * rng.standard_normal(2_000)
-    pd.DataFrame({"time": times, "celsius": measured}).to_csv(tmp_path / "telemetry.csv", index=False)
+    pd.DataFrame({"time": times, "celsius": measured}).to_csv(
+        tmp_path / "telemetry.csv", index=False
+    )
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -28,7 +32,9 @@ def folder(tmp_path, monkeypatch):
 def test_the_example_with_files_runs(folder, capsys):
     made = {}
     exec(BLOCKS[0].replace("FitOptions(seed=0)", "FitOptions(seed=0, num_windows=200)"), made)
-    assert [copy.shape for copy in made["copies"]] == [(300, 1)] * 3 and "Used: " in capsys.readouterr().out
+    assert [copy.shape for copy in made["copies"]] == [
+        (300, 1)
+    ] * 3 and "Used: " in capsys.readouterr().out
 
 
 def test_the_example_with_a_function_runs(folder):
@@ -43,7 +49,9 @@ def test_the_example_with_an_fmu_runs(folder):
     builder = pytest.importorskip("pythonfmu.builder", reason="pythonfmu is not installed")
     builder.FmuBuilder.build_FMU(TESTS / "coarse_simulator" / "heater_fmu.py", dest=folder)
     command = (np.sin(np.arange(300) / 15) > 0).astype(int)
-    pd.DataFrame({"time": pd.date_range("2024-01-01", periods=300, freq="10s"), "command": command}).to_csv("commands.csv", index=False)
+    pd.DataFrame(
+        {"time": pd.date_range("2024-01-01", periods=300, freq="10s"), "command": command}
+    ).to_csv("commands.csv", index=False)
     made = {}
     exec(BLOCKS[2], made)
     nominal, weak = (made[name].parts[0].values for name in ("nominal", "weak"))

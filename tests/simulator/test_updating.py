@@ -19,10 +19,17 @@ def newer():
 def test_the_new_level_gain_and_noise_are_reported(single, newer):
     updated, report = update(single[0], newer)
     before, after = report.before, report.after  # the wave from 3 to 7 becomes one from 19 to 31
-    assert before["level"]["volts"] == pytest.approx(5, rel=0.02) and after["level"]["volts"] == pytest.approx(25, rel=0.02)
+    assert before["level"]["volts"] == pytest.approx(5, rel=0.02) and after["level"][
+        "volts"
+    ] == pytest.approx(25, rel=0.02)
     assert after["gain"]["volts"] / before["gain"]["volts"] == pytest.approx(3, rel=0.05)
-    assert report.after["noise_sd"]["volts"] == pytest.approx(0.3, rel=0.2) and single[0].noise_sd == pytest.approx(0.1, rel=0.2)
-    assert report.before["alarms"] > 0.9 > 0.1 > report.after["alarms"] and updated.trained["updates"][0]["num_samples"] == 3_000
+    assert report.after["noise_sd"]["volts"] == pytest.approx(0.3, rel=0.2) and single[
+        0
+    ].noise_sd == pytest.approx(0.1, rel=0.2)
+    assert (
+        report.before["alarms"] > 0.9 > 0.1 > report.after["alarms"]
+        and updated.trained["updates"][0]["num_samples"] == 3_000
+    )
     assert "flagged samples" in report.lines()[-1] and report.to_dict()["channels"] == ["volts"]
 
 

@@ -16,7 +16,13 @@ from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.regular_grid import find_interval
 from enhsim_tf.telemetry.cleaning.report import KINDS, lines_of
 
-settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+settings.register_profile(
+    "repeatable",
+    derandomize=True,
+    deadline=None,
+    max_examples=150,
+    suppress_health_check=list(HealthCheck),
+)
 settings.load_profile("repeatable")
 
 N = 400
@@ -30,16 +36,23 @@ def check_balance(cleaned):
     """Checks that every row and sample is accounted for, and that the parts are regular, finite and in chronological order."""
     report = cleaned.report
     assert report.rows_in == report.rows_used + report.rows_left_out
-    assert report.samples == report.rows_used + report.samples_filled == sum(map(len, cleaned.parts))
+    assert (
+        report.samples == report.rows_used + report.samples_filled == sum(map(len, cleaned.parts))
+    )
     assert report.num_parts == len(cleaned.parts) > 0
     assert {finding.kind for finding in report.findings} <= set(KINDS)
-    assert all(finding.count > 0 and len(finding.line().splitlines()) == 1 for finding in report.findings)
+    assert all(
+        finding.count > 0 and len(finding.line().splitlines()) == 1 for finding in report.findings
+    )
     assert all(finding.action == "left out" for finding in report.findings if finding.rows_left_out)
     assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["rows_in"] == report.rows_in
     ends = -np.inf
     for part in cleaned.parts:
         assert part.values.dtype == np.float32 and np.isfinite(part.values).all()
-        assert (part.interval_s, part.start) == (cleaned.parts[0].interval_s, cleaned.parts[0].start)
+        assert (part.interval_s, part.start) == (
+            cleaned.parts[0].interval_s,
+            cleaned.parts[0].start,
+        )
         assert part.offset_s > ends
         ends = part.time_s[-1]
 
@@ -81,7 +94,9 @@ def linear(rows, values=VALUES):
 
 
 RNG = np.random.default_rng(1)
-JITTER = pd.to_timedelta(np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")  # most times are undamaged
+JITTER = pd.to_timedelta(
+    np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s"
+)  # most times are undamaged
 SHUFFLED = RNG.permutation(N)
 NANOSECONDS = TIMES.as_unit("ns").asi8
 ISO, ONE_MORE = TIMES.astype(str).to_numpy(object), np.insert(VALUES, 30, 7)
@@ -93,16 +108,36 @@ REPAIRED = {
     "as it should be": (CLEAN, {}, {}),
     "a pandas extension type": (CLEAN.astype("Float64"), {}, {}),
     "times of another zone": (CLEAN.tz_convert("America/New_York"), {}, {}),
-    "local times with a zone": (CLEAN.tz_convert("Asia/Kolkata").tz_localize(None), {"timezone": "Asia/Kolkata"}, {}),
-    "shuffled": (CLEAN.iloc[SHUFFLED], {}, {"unsorted": np.sum(SHUFFLED < np.maximum.accumulate(SHUFFLED))}),
+    "local times with a zone": (
+        CLEAN.tz_convert("Asia/Kolkata").tz_localize(None),
+        {"timezone": "Asia/Kolkata"},
+        {},
+    ),
+    "shuffled": (
+        CLEAN.iloc[SHUFFLED],
+        {},
+        {"unsorted": np.sum(SHUFFLED < np.maximum.accumulate(SHUFFLED))},
+    ),
     "two rows exchanged": (CLEAN.iloc[[0, 2, 1, *range(3, N)]], {}, {"unsorted": 1}),
     "from the last to the first": (CLEAN.iloc[::-1], {}, {"unsorted": N - 1}),
     "rows twice": (pd.concat([CLEAN, CLEAN.iloc[3:8]]).sort_index(), {}, {"duplicate rows": 5}),
-    "jitter": (with_times(TIMES + JITTER), {}, {"jitter": np.sum(np.abs(JITTER.total_seconds()) > 1e-3)}),
+    "jitter": (
+        with_times(TIMES + JITTER),
+        {},
+        {"jitter": np.sum(np.abs(JITTER.total_seconds()) > 1e-3)},
+    ),
     "ISO text": (with_times(TIMES.astype(str)), {}, {}),
     "ISO text, basic form": (with_times(TIMES.strftime("%Y%m%dT%H%M%SZ")), {}, {}),
-    "date-times as objects": (with_times(pd.Index([time.to_pydatetime() for time in TIMES], dtype=object)), {}, {}),
-    "dates of a given format": (with_times(TIMES.strftime("%d.%m.%y %H:%M:%S")), {"time_format": "%d.%m.%y %H:%M:%S"}, {}),
+    "date-times as objects": (
+        with_times(pd.Index([time.to_pydatetime() for time in TIMES], dtype=object)),
+        {},
+        {},
+    ),
+    "dates of a given format": (
+        with_times(TIMES.strftime("%d.%m.%y %H:%M:%S")),
+        {"time_format": "%d.%m.%y %H:%M:%S"},
+        {},
+    ),
     "epoch seconds": (with_times(NANOSECONDS // 10**9), {}, {}),
     "epoch milliseconds": (with_times(NANOSECONDS // 10**6), {}, {}),
     "epoch nanoseconds": (with_times(NANOSECONDS), {}, {}),
@@ -110,18 +145,50 @@ REPAIRED = {
     "days since 1970": (with_times(NANOSECONDS / 86_400e9), {"time_format": "D"}, {}),
     "periods": (with_times(pd.period_range("2020-03-01", periods=N, freq="s")), {}, {}),
     "time spans since 1970": (with_times(TIMES - pd.Timestamp(0, tz="UTC")), {}, {}),
-    "categories": (with_times(pd.CategoricalIndex(TIMES.astype(str)), pd.Categorical(WORDS)), {}, {}),
-    "rows without a time": (with_times(np.insert(ISO, [5, 5, 9], ""), np.insert(VALUES, [5, 5, 9], 7)), {}, {"missing times": 3}),
-    "words among the times, dropped": (with_times(np.insert(ISO, 30, "reboot"), ONE_MORE), {"drop_bad": True}, {"bad times": 1}),
+    "categories": (
+        with_times(pd.CategoricalIndex(TIMES.astype(str)), pd.Categorical(WORDS)),
+        {},
+        {},
+    ),
+    "rows without a time": (
+        with_times(np.insert(ISO, [5, 5, 9], ""), np.insert(VALUES, [5, 5, 9], 7)),
+        {},
+        {"missing times": 3},
+    ),
+    "words among the times, dropped": (
+        with_times(np.insert(ISO, 30, "reboot"), ONE_MORE),
+        {"drop_bad": True},
+        {"bad times": 1},
+    ),
     "times that nobody lives to see": (
         with_times(np.insert(NANOSECONDS / 1e9, 30, 1e18), ONE_MORE),
         {"drop_bad": True},
         {"bad times": 1},
     ),
-    "NaN": (set_rows([7, 8, 50], np.nan, float), {}, {"missing values": 3, "gaps filled": 2}, linear([7, 8, 50])),
-    "pandas' NA": (set_rows([7], pd.NA, "Float64"), {}, {"missing values": 1, "gaps filled": 1}, linear([7])),
-    "empty text": (set_rows([7, 50], ["", " "]), {}, {"missing values": 2, "gaps filled": 2}, linear([7, 50])),
-    "words for nothing": (set_rows([7, 50, 90], ["nan", "N/A", "NULL"]), {}, {"missing values": 3, "gaps filled": 3}, linear([7, 50, 90])),
+    "NaN": (
+        set_rows([7, 8, 50], np.nan, float),
+        {},
+        {"missing values": 3, "gaps filled": 2},
+        linear([7, 8, 50]),
+    ),
+    "pandas' NA": (
+        set_rows([7], pd.NA, "Float64"),
+        {},
+        {"missing values": 1, "gaps filled": 1},
+        linear([7]),
+    ),
+    "empty text": (
+        set_rows([7, 50], ["", " "]),
+        {},
+        {"missing values": 2, "gaps filled": 2},
+        linear([7, 50]),
+    ),
+    "words for nothing": (
+        set_rows([7, 50, 90], ["nan", "N/A", "NULL"]),
+        {},
+        {"missing values": 3, "gaps filled": 3},
+        linear([7, 50, 90]),
+    ),
     "a word of this source for nothing": (
         set_rows([7], "offline"),
         {"missing_values": "offline"},
@@ -130,7 +197,11 @@ REPAIRED = {
     ),
     "rows missing": (CLEAN.drop(TIMES[[7, 8, 50]]), {}, {"gaps filled": 2}, linear([7, 8, 50])),
     "numbers as text with spaces": (with_times(TIMES, [f" {word}\t" for word in WORDS]), {}, {}),
-    "decimal commas": (with_times(TIMES, [word.replace(".", ",") for word in WORDS]), {}, {"decimal comma": N}),
+    "decimal commas": (
+        with_times(TIMES, [word.replace(".", ",") for word in WORDS]),
+        {},
+        {"decimal comma": N},
+    ),
     "decimals as objects": (with_times(TIMES, list(map(decimal.Decimal, WORDS))), {}, {}),
     "a unit behind one number, dropped": (set_rows([7], "1.5 V"), *DROPPED),
     "beyond float32, dropped": (set_rows([7], 1e39, float), *DROPPED),
@@ -152,7 +223,10 @@ def test_a_known_damage_is_repaired_and_reported(name):
 BAD_VALUES = {
     "a unit behind one number": (set_rows([7], "1.5 V"), "'1.5 V' at row 7 of volts (1 in all)"),
     "commas and points": (set_rows([7, 8], ["1,5", "1.5"]), "'1,5' at row 7"),
-    "thousands or thousandths": (with_times(TIMES, ["1,500", "2,250"] * (N // 2)), "'1,500' at row 0"),
+    "thousands or thousandths": (
+        with_times(TIMES, ["1,500", "2,250"] * (N // 2)),
+        "'1,500' at row 0",
+    ),
     "beyond float32": (set_rows([7], 1e39, float), "1e+39 at row 7"),
     "an integer beyond float64": (set_rows([7], 10**400), "at row 7"),
     "text beyond float64": (set_rows([7], "1e999"), "'1e999' at row 7"),
@@ -169,26 +243,50 @@ BAD_VALUES = {
     "a table": (CLEAN.to_frame(), "shape (400, 1)"),
     "two axes": (np.zeros((3, 4)), "shape (3, 4)"),
     "a structured array": (np.zeros(3, [("a", float)]), "telemetry"),
-    "one index of two levels": (with_times(pd.MultiIndex.from_product([["a"], TIMES])), "MultiIndex"),
+    "one index of two levels": (
+        with_times(pd.MultiIndex.from_product([["a"], TIMES])),
+        "MultiIndex",
+    ),
 }
 BAD_TIMES = {
     "words": (with_times(["noon"] * N), "'noon' at row 0 of the times of volts (400 in all)"),
     "days with two-digit years": (with_times(TIMES.strftime("%d/%m/%y %H:%M:%S")), "time_format"),
-    "dates as numbers": (with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)), "time_format '%Y%m%d'"),
+    "dates as numbers": (
+        with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)),
+        "time_format '%Y%m%d'",
+    ),
     "numbers of no unit": (with_times(np.arange(N) + 10**10), "time_format"),
-    "numbers, text and dates": (with_times(pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)), "at row 2"),
+    "numbers, text and dates": (
+        with_times(
+            pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)
+        ),
+        "at row 2",
+    ),
     "intervals": (with_times(pd.interval_range(0, N)), "interval"),
-    "date-times in the year 9000": (with_times(pd.DatetimeIndex(np.array(["9000-01-01"] * N, "datetime64[s]"))), "1678 to 2261"),
+    "date-times in the year 9000": (
+        with_times(pd.DatetimeIndex(np.array(["9000-01-01"] * N, "datetime64[s]"))),
+        "1678 to 2261",
+    ),
     "infinite": (with_times(np.where(np.arange(N) == 9, np.inf, np.arange(N))), "inf at row 9"),
     "far away": (with_times(np.where(np.arange(N) == 9, 1e18, np.arange(N))), "1e+18 at row 9"),
     "true and false": (with_times(np.arange(N) % 2 == 0), "dtype bool"),
     "complex": (with_times(np.arange(N) + 1j), "complex"),
-    "some with a zone": (with_times([str(TIMES[0]), *TIMES.tz_localize(None).astype(str)[1:]]), "all or none"),
+    "some with a zone": (
+        with_times([str(TIMES[0]), *TIMES.tz_localize(None).astype(str)[1:]]),
+        "all or none",
+    ),
     "objects": (with_times(pd.Index([datetime.timedelta] * N, dtype=object)), "at row 0"),
     "none at all": (with_times(pd.DatetimeIndex([pd.NaT] * N)), "Received: none"),
-    "at random": (with_times(TIMES[0] + pd.to_timedelta(np.cumsum(RNG.exponential(size=N)), unit="s")), "interval_s"),
+    "at random": (
+        with_times(TIMES[0] + pd.to_timedelta(np.cumsum(RNG.exponential(size=N)), unit="s")),
+        "interval_s",
+    ),
     "a local clock set back": (
-        with_times(pd.date_range("2020-10-25T00:30Z", periods=N, freq="min").tz_convert("Europe/Berlin").tz_localize(None)),
+        with_times(
+            pd.date_range("2020-10-25T00:30Z", periods=N, freq="min")
+            .tz_convert("Europe/Berlin")
+            .tz_localize(None)
+        ),
         "timezone (--timezone Europe/Berlin",
     ),
 }
@@ -205,7 +303,14 @@ def test_input_that_cannot_be_parsed_is_refused_with_its_place(refused, name):
 
 @pytest.mark.parametrize(
     ("cell", "number"),
-    [("1'234.5", 1234.5), ("1\u00a0234,5", 1234.5), ("12 345", 12345), ("+   1.5", 1.5), ("1.5D-01", 0.15), ("1234 5", None)],
+    [
+        ("1'234.5", 1234.5),
+        ("1\u00a0234,5", 1234.5),
+        ("12 345", 12345),
+        ("+   1.5", 1.5),
+        ("1.5D-01", 0.15),
+        ("1234 5", None),
+    ],
 )
 def test_numbers_of_other_programs_by_hand(cell, number):
     values, bad, _ = parse_numbers(pd.Series([cell, "2"]), "", drop=True)
@@ -242,14 +347,22 @@ def test_one_of_several_values_at_the_same_time_is_taken(how, value):
     cleaned = cleaned_of(series, same_time=how)
     as_one(cleaned, np.where(np.arange(N) == 11, value, VALUES))
     (finding,) = repairs(cleaned.report)
-    assert (finding.kind, finding.count, finding.rows_left_out) == ("same time", 1, 1) and "2020-03-01T00:00:11" in finding.places[0]
+    assert (finding.kind, finding.count, finding.rows_left_out) == (
+        "same time",
+        1,
+        1,
+    ) and "2020-03-01T00:00:11" in finding.places[0]
 
 
 @pytest.mark.parametrize("interval_s", [None, 1.0])
 def test_one_late_row_is_snapped_and_named(interval_s):
     series = with_times(TIMES + pd.to_timedelta(np.where(np.arange(N) == 70, 0.125, 0.0), unit="s"))
     found = cleaned_of(series, interval_s=interval_s).report.find("jitter")
-    assert (found.count, found.details["largest_s"], found.places[0]) == (1, 0.125, "row 70, 2020-03-01T00:01:10.125000+00:00")
+    assert (found.count, found.details["largest_s"], found.places[0]) == (
+        1,
+        0.125,
+        "row 70, 2020-03-01T00:01:10.125000+00:00",
+    )
 
 
 def test_steps_that_differ_are_rows_missing_and_no_other_rate():
@@ -257,10 +370,16 @@ def test_steps_that_differ_are_rows_missing_and_no_other_rate():
     assert cleaned_of(with_times(times, VALUES[: len(times)])).report.find("other rates") is None
 
 
-BY_HAND = [[1] * 4 + [5] * 3 + [9] * 3, [1] * 4 + [0.1] * 3 + [0.3] * 3, [1] * 40 + [10] + [1] * 50 + [1.2] + [1] * 49]
+BY_HAND = [
+    [1] * 4 + [5] * 3 + [9] * 3,
+    [1] * 4 + [0.1] * 3 + [0.3] * 3,
+    [1] * 40 + [10] + [1] * 50 + [1.2] + [1] * 49,
+]
 
 
-@pytest.mark.parametrize("steps", BY_HAND, ids=["rows missing", "finer stretches", "a gap and a step of the clock"])
+@pytest.mark.parametrize(
+    "steps", BY_HAND, ids=["rows missing", "finer stretches", "a gap and a step of the clock"]
+)
 def test_the_interval_by_hand(steps):
     assert find_interval(np.round(np.cumsum([0, *steps]) * 1e9).astype(np.int64)) == 1e9
 
@@ -287,37 +406,55 @@ def test_two_rows_are_enough_for_an_interval():
 
 
 def test_a_missing_value_at_a_repeated_time_is_ignored():
-    series = pd.concat([CLEAN.iloc[:6], pd.Series([np.nan, 9.0], index=TIMES[[5, 6]]), CLEAN.iloc[7:]])
+    series = pd.concat(
+        [CLEAN.iloc[:6], pd.Series([np.nan, 9.0], index=TIMES[[5, 6]]), CLEAN.iloc[7:]]
+    )
     for how in ("mean", "last"):
         cleaned = cleaned_of(series, same_time=how)
         as_one(cleaned, np.where(np.arange(N) == 6, 9.0, VALUES))
-        assert (cleaned.report.find("missing values").count, cleaned.report.find("same time")) == (1, None)
+        assert (cleaned.report.find("missing values").count, cleaned.report.find("same time")) == (
+            1,
+            None,
+        )
 
 
 GAP = np.arange(100, 106)
 
 
 @pytest.mark.parametrize(
-    "series", [CLEAN.drop(TIMES[GAP]), set_rows(GAP, np.nan, float), set_rows(GAP, np.inf, float)], ids=["-", "NaN", "inf"]
+    "series",
+    [CLEAN.drop(TIMES[GAP]), set_rows(GAP, np.nan, float), set_rows(GAP, np.inf, float)],
+    ids=["-", "NaN", "inf"],
 )
 def test_a_gap_of_more_than_max_fill_splits_the_series(series):
     cleaned = cleaned_of(series)
     before, after = cleaned.parts
     np.testing.assert_array_equal(before.values, VALUES[:100].astype(np.float32))
     np.testing.assert_array_equal(after.values, VALUES[106:].astype(np.float32))
-    assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
+    assert (before.offset_s, after.offset_s, after.start) == (
+        0,
+        106,
+        before.start,
+    ) and cleaned.longest is after
     found = cleaned.report.find("gaps")
-    assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
+    assert (found.count, found.details["longest"]) == (
+        1,
+        7.0,
+    ) and "2020-03-01T00:01:39" in found.places[0]
     filled = cleaned_of(series, max_fill=6)
     as_one(filled, linear(GAP))
     assert filled.report.find("gaps filled").samples_filled == 6
 
 
 @pytest.mark.parametrize(
-    ("index", "longest"), [(pd.date_range(START, periods=30, freq="10s"), 80.0), (None, 8.0)], ids=["seconds", "samples"]
+    ("index", "longest"),
+    [(pd.date_range(START, periods=30, freq="10s"), 80.0), (None, 8.0)],
+    ids=["seconds", "samples"],
 )
 def test_the_longest_gap_is_told_in_seconds_or_samples(index, longest):
-    series = pd.Series(np.where((np.arange(30) > 5) & (np.arange(30) < 13), np.nan, np.arange(30.0)), index)
+    series = pd.Series(
+        np.where((np.arange(30) > 5) & (np.arange(30) < 13), np.nan, np.arange(30.0)), index
+    )
     assert cleaned_of(series).report.find("gaps").details["longest"] == longest
 
 
@@ -329,21 +466,32 @@ def test_a_gap_of_max_fill_is_filled_on_a_given_grid_as_well():
 
 def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row():
     seconds, values = [0, 7, 8, 30, 31.2, 90], [1.0, 2.0, 2.5, 0.0, 4.0, 5.0]
-    series = pd.Series(values, pd.Timestamp("2020-03-01", tz="UTC") + pd.to_timedelta(seconds, unit="s"))
+    series = pd.Series(
+        values, pd.Timestamp("2020-03-01", tz="UTC") + pd.to_timedelta(seconds, unit="s")
+    )
     held = cleaned_of(series, interval_s=1.0, fill="hold")
     expected = np.concatenate([[1.0] * 7, [2.0], [2.5] * 22, [0.0], [4.0] * 59, [5.0]])
     (part,) = held.parts
     np.testing.assert_array_equal(part.values, expected.astype(np.float32))
-    assert held.report.samples_filled == len(expected) - 6 and "filled with the value before them" in held.report.find("gaps filled").text
+    assert (
+        held.report.samples_filled == len(expected) - 6
+        and "filled with the value before them" in held.report.find("gaps filled").text
+    )
     # the last of several rows in an interval counts, and a long gap splits the series if it is asked for
     coarser = cleaned_of(series, interval_s=10.0, fill="hold")
-    np.testing.assert_array_equal(coarser.parts[0].values, np.float32([1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5]))
+    np.testing.assert_array_equal(
+        coarser.parts[0].values, np.float32([1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5])
+    )
     assert coarser.report.rows_in == coarser.report.rows_used + coarser.report.rows_left_out
-    assert cleaned_of(series, interval_s=1.0, fill="hold", max_fill=30).report.find("gaps").count == 1
+    assert (
+        cleaned_of(series, interval_s=1.0, fill="hold", max_fill=30).report.find("gaps").count == 1
+    )
 
 
 def test_short_parts_are_left_out_and_counted(refused):
-    series = CLEAN.drop(TIMES[[*range(100, 110), *range(115, 130)]])  # leaves an isolated part of five samples
+    series = CLEAN.drop(
+        TIMES[[*range(100, 110), *range(115, 130)]]
+    )  # leaves an isolated part of five samples
     assert [len(part) for part in cleaned_of(series).parts] == [100, 5, 270]
     cleaned = cleaned_of(series, min_part=6)
     assert [len(part) for part in cleaned.parts] == [100, 270]
@@ -354,10 +502,14 @@ def test_short_parts_are_left_out_and_counted(refused):
 
 def test_jumps_of_the_clock_split_the_series_and_keep_every_row():
     """The grid of the first part lies between the times before and after the first jump, which are 0.4 s apart."""
-    times = TIMES + pd.to_timedelta(0.4 * (np.arange(N) >= 100) + 0.4 * (np.arange(N) >= 150), unit="s")
+    times = TIMES + pd.to_timedelta(
+        0.4 * (np.arange(N) >= 100) + 0.4 * (np.arange(N) >= 150), unit="s"
+    )
     cleaned = cleaned_of(with_times(times))
     before, after = cleaned.parts
-    assert before.values.tolist() == VALUES[:150].astype(np.float32).tolist() and after.offset_s == pytest.approx(150 + 0.8 - 0.2)
+    assert before.values.tolist() == VALUES[:150].astype(
+        np.float32
+    ).tolist() and after.offset_s == pytest.approx(150 + 0.8 - 0.2)
     assert after.values.tolist() == VALUES[150:].astype(np.float32).tolist()
     assert (cleaned.report.find("clock steps").count, cleaned.report.rows_used) == (1, N)
 
@@ -368,20 +520,26 @@ def test_the_interval_is_that_of_the_rows(interval, unit):
     nanoseconds = np.round(np.arange(5_000) * interval * 1e9).astype(np.int64)
     times = pd.DatetimeIndex(nanoseconds.view("datetime64[ns]"), tz="UTC").as_unit(unit)
     (part,) = cleaned_of(with_times(times, np.sin(np.arange(5_000) / 9))).parts
-    assert len(part) == 5_000 and part.interval_s * 5_000 == pytest.approx(interval * 5_000, abs=0.1 * interval)
+    assert len(part) == 5_000 and part.interval_s * 5_000 == pytest.approx(
+        interval * 5_000, abs=0.1 * interval
+    )
 
 
 @pytest.mark.parametrize("where", [0, 150, 340])
 def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
     """Each sample of the stretch is replaced by five rows around its time whose mean equals the sample."""
-    offsets, differences = np.array([-0.4, -0.2, 0.0, 0.2, 0.4]), np.array([1.0, -2.0, 0.5, 2.0, -1.5])
+    offsets, differences = (
+        np.array([-0.4, -0.2, 0.0, 0.2, 0.4]),
+        np.array([1.0, -2.0, 0.5, 2.0, -1.5]),
+    )
     inside = np.arange(where + 1, where + 51)
     times = START + pd.to_timedelta((inside[:, None] + offsets).ravel(), unit="s")
     fine = with_times(times, (VALUES[inside, None] + differences).ravel())
     cleaned = cleaned_of(pd.concat([CLEAN.drop(TIMES[inside]), fine]).sort_index())
     as_one(cleaned, off=1e-5)
     assert (
-        cleaned.report.find("averaged").rows_left_out == 50 * 4 and cleaned.report.find("other rates").count == 50 * 5 + 2
+        cleaned.report.find("averaged").rows_left_out == 50 * 4
+        and cleaned.report.find("other rates").count == 50 * 5 + 2
     )  # the steps of 0.6 s before and after it, too
 
 
@@ -391,7 +549,9 @@ def test_a_wandering_clock_splits_the_series_before_a_time_is_off_by_more_than_a
     assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
     begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
     for part in cleaned.parts:
-        rows = part.values.astype(int)  # values are row numbers, so a filled sample lies between two integers
+        rows = part.values.astype(
+            int
+        )  # values are row numbers, so a filled sample lies between two integers
         real = part.values == rows
         assert np.abs(begin + part.time_s - rows - wander[rows])[real].max() <= 0.25 + 1e-6
 
@@ -401,8 +561,13 @@ def test_a_coarser_stretch_is_filled_or_splits_the_series():
     series = CLEAN.drop(TIMES[inside])
     cleaned = cleaned_of(series)
     as_one(cleaned, linear(inside))
-    assert cleaned.report.samples_filled == len(inside) and cleaned.report.find("other rates").count == 31
-    wide = cleaned_of(series, max_fill=2)  # three missing samples between rows are more than max_fill
+    assert (
+        cleaned.report.samples_filled == len(inside)
+        and cleaned.report.find("other rates").count == 31
+    )
+    wide = cleaned_of(
+        series, max_fill=2
+    )  # three missing samples between rows are more than max_fill
     assert [len(part) for part in wide.parts] == [121, 160]
 
 
@@ -410,22 +575,34 @@ def test_a_given_interval_averages_the_rows_that_share_it():
     cleaned = cleaned_of(CLEAN, interval_s=4)
     (part,) = cleaned.parts
     groups = np.round(np.arange(N) / 4).astype(int)  # the nearest grid point, with ties to even
-    np.testing.assert_allclose(part.values, [VALUES[groups == group].mean() for group in range(groups[-1] + 1)], atol=1e-6)
+    np.testing.assert_allclose(
+        part.values, [VALUES[groups == group].mean() for group in range(groups[-1] + 1)], atol=1e-6
+    )
     assert (part.interval_s, cleaned.report.find("averaged").rows_left_out) == (4, N - len(part))
 
 
 def test_local_times_are_converted_across_clock_changes():
     times = pd.date_range("2020-10-24T22:00Z", periods=500, freq="min")
-    local = with_times(times.tz_convert("Europe/Berlin").tz_localize(None), np.sin(np.arange(500) / 9))
+    local = with_times(
+        times.tz_convert("Europe/Berlin").tz_localize(None), np.sin(np.arange(500) / 9)
+    )
     cleaned = cleaned_of(local, timezone="Europe/Berlin")
-    assert len(cleaned.parts) == 1 and len(cleaned.longest) == 500 and cleaned.longest.start == "2020-10-24T22:00:00+00:00"
+    assert (
+        len(cleaned.parts) == 1
+        and len(cleaned.longest) == 500
+        and cleaned.longest.start == "2020-10-24T22:00:00+00:00"
+    )
     cleaned = cleaned_of(local.sample(frac=1, random_state=0), timezone="Europe/Berlin")
     found = cleaned.report.find("clock change")
     assert found.rows_left_out == 120  # without chronological order, the repeated hour is ambiguous
     merged = cleaned_of(local, timezone="UTC")
     assert merged.report.find("same time").rows_left_out == 60
-    spring = with_times(pd.date_range("2020-03-29T00:00", periods=300, freq="min"), np.sin(np.arange(300) / 9))
-    assert cleaned_of(spring, timezone="Europe/Berlin").report.find("clock change").rows_left_out == 60
+    spring = with_times(
+        pd.date_range("2020-03-29T00:00", periods=300, freq="min"), np.sin(np.arange(300) / 9)
+    )
+    assert (
+        cleaned_of(spring, timezone="Europe/Berlin").report.find("clock change").rows_left_out == 60
+    )
 
 
 def test_samples_are_counted_without_times():
@@ -451,23 +628,60 @@ def test_properties_of_the_values_are_reported():
     assert found.details == {"step": 0.0625} and found.count == len(np.unique(steps))
     assert repairs(cleaned_of(CLEAN).report) == []
     stuck = cleaned_of(set_rows(np.arange(200, 260), VALUES[200], float)).report.find("stuck")
-    assert (stuck.count, stuck.details["longest"]) == (1, 60) and stuck.places[0].startswith("row 200,")
+    assert (stuck.count, stuck.details["longest"]) == (1, 60) and stuck.places[0].startswith(
+        "row 200,"
+    )
     plateaus = np.where(np.arange(N) // 25 % 2, 1.0, -1.0)
     plateaus[200:300] = 0.5
-    assert cleaned_of(with_times(TIMES, plateaus)).report.find("stuck").count == 1, "plateaus are what this channel does"
+    assert cleaned_of(with_times(TIMES, plateaus)).report.find("stuck").count == 1, (
+        "plateaus are what this channel does"
+    )
     constant = cleaned_of(with_times(TIMES, 3.5))
-    assert [finding.kind for finding in repairs(constant.report)] == ["constant"] and set(constant.parts[0].values) == {3.5}
-    drifting = cleaned_of(with_times(TIMES, VALUES + np.arange(N) / 100)).report.find("changing level")
-    assert drifting.count == 10 and drifting.details["low"][-1] - drifting.details["low"][0] == pytest.approx(3.6, abs=1)
-    assert cleaned_of(with_times(TIMES, VALUES * np.linspace(1, 5, N))).report.find("changing level") is not None
+    assert [finding.kind for finding in repairs(constant.report)] == ["constant"] and set(
+        constant.parts[0].values
+    ) == {3.5}
+    drifting = cleaned_of(with_times(TIMES, VALUES + np.arange(N) / 100)).report.find(
+        "changing level"
+    )
+    assert drifting.count == 10 and drifting.details["low"][-1] - drifting.details["low"][
+        0
+    ] == pytest.approx(3.6, abs=1)
+    assert (
+        cleaned_of(with_times(TIMES, VALUES * np.linspace(1, 5, N))).report.find("changing level")
+        is not None
+    )
     rounded = cleaned_of(with_times(TIMES, VALUES + 1e6)).report.find("resolution")
-    assert rounded.details["error"] == pytest.approx(0.03, abs=0.01)  # float32 keeps steps of 1/16 at a million
+    assert rounded.details["error"] == pytest.approx(
+        0.03, abs=0.01
+    )  # float32 keeps steps of 1/16 at a million
 
 
 DIRTY_CELL = st.one_of(
-    st.floats(-5, 5), st.sampled_from([np.nan, np.inf, -np.inf, None, "", "nan", "1.5", "-", "1.5 V", "1,5", 1e39, True, 10**400, pd.NA])
+    st.floats(-5, 5),
+    st.sampled_from(
+        [
+            np.nan,
+            np.inf,
+            -np.inf,
+            None,
+            "",
+            "nan",
+            "1.5",
+            "-",
+            "1.5 V",
+            "1,5",
+            1e39,
+            True,
+            10**400,
+            pd.NA,
+        ]
+    ),
 )
-DIRTY_STEP = st.one_of(st.just(1.0), st.floats(0, 3), st.sampled_from([0.0, -1.0, -7.5, 0.25, 2.0, 6.0, 40.0, 3_600.0, -3_600.0, None]))
+DIRTY_STEP = st.one_of(
+    st.just(1.0),
+    st.floats(0, 3),
+    st.sampled_from([0.0, -1.0, -7.5, 0.25, 2.0, 6.0, 40.0, 3_600.0, -3_600.0, None]),
+)
 
 
 @given(
@@ -488,7 +702,9 @@ def test_no_row_is_lost_silently(cells, nominal, options, form):
     steps = [1.0] * nominal + [step for step, _ in cells]
     values = [float(row % 7) for row in range(nominal)] + [cell for _, cell in cells]
     seconds = np.cumsum([step or 0.0 for step in steps]) + 1e6
-    times = pd.to_datetime(np.where([step is None for step in steps], np.nan, seconds), unit="s", utc=True)
+    times = pd.to_datetime(
+        np.where([step is None for step in steps], np.nan, seconds), unit="s", utc=True
+    )
     if form == "text":
         index = times.astype(str)
     elif form == "seconds":
@@ -500,7 +716,11 @@ def test_no_row_is_lost_silently(cells, nominal, options, form):
     try:
         cleaned = clean(series, Cleaning(**options))
     except InputError as error:
-        assert str(error).startswith("Expected ") and "Received: " in str(error) and len(str(error).splitlines()) == 1
+        assert (
+            str(error).startswith("Expected ")
+            and "Received: " in str(error)
+            and len(str(error).splitlines()) == 1
+        )
     else:
         check_balance(cleaned)
         assert cleaned.report.rows_in == len(values)
@@ -523,7 +743,9 @@ def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, ma
     with_value = np.setdiff1d(kept, blank)
     rows = rng.permutation(np.concatenate([kept, np.intersect1d(twice, kept)])).astype(int)
     given_values = np.where(np.isin(np.arange(300), blank), np.nan, values)
-    series = pd.Series(given_values[rows], index=START + pd.to_timedelta(rows + off[rows], unit="s"))
+    series = pd.Series(
+        given_values[rows], index=START + pd.to_timedelta(rows + off[rows], unit="s")
+    )
     cleaned = clean(series, Cleaning(max_fill=max_fill, min_part=1))
     check_balance(cleaned)
     runs = np.split(with_value, np.flatnonzero(np.diff(with_value) > max_fill + 1) + 1)
@@ -541,6 +763,10 @@ def test_what_channels_share_is_said_once():
     first, *rest = lines_of(reports)
     assert first.startswith("volts, amperes: 398 rows, 398 used")
     shared = [finding.line() for finding in reports[0].findings]
-    assert shared and [line for line in rest if line.startswith("volts, amperes: ")] == [f"volts, amperes: {line}" for line in shared]
-    assert [line for line in rest if line.startswith("amperes: ")] and not [line for line in rest if line.startswith("volts: ")]
+    assert shared and [line for line in rest if line.startswith("volts, amperes: ")] == [
+        f"volts, amperes: {line}" for line in shared
+    ]
+    assert [line for line in rest if line.startswith("amperes: ")] and not [
+        line for line in rest if line.startswith("volts: ")
+    ]
     assert lines_of(reports[:1]) == reports[0].lines() == [f"volts: {reports[0].summary}", *shared]

@@ -57,38 +57,98 @@ ZERO = pd.Timestamp(0, tz="UTC")
 MINUTES, UTC = stamps("%Y-%m-%d %H:%M"), stamps("%Y-%m-%dT%H:%M:%SZ")
 # form: text, start of the series
 READ = {
-    "ISO 8601 with a comma": (table("time;v", stamps("%Y-%m-%d %H:%M:%S,500"), VALUES, separator=";"), START + pd.Timedelta("500ms")),
+    "ISO 8601 with a comma": (
+        table("time;v", stamps("%Y-%m-%d %H:%M:%S,500"), VALUES, separator=";"),
+        START + pd.Timedelta("500ms"),
+    ),
     "UTC in words": (table("time,v", stamps("%Y-%m-%d %H:%M:%S UTC"), VALUES), START),
     "day of year": (table("time,v", stamps("%Y-%jT%H:%M:%S"), VALUES), START),
     "day of year with colons": (table("time,v", stamps("%Y:%j:%H:%M:%S.%f"), VALUES), START),
     "day, month in letters": (table("Time,v", stamps("%d-%b-%Y %H:%M:%S"), VALUES), START),
-    "month in letters first": (table("Time;v", stamps("%b %d, %Y %H:%M:%S"), VALUES, separator=";"), START),
+    "month in letters first": (
+        table("Time;v", stamps("%b %d, %Y %H:%M:%S"), VALUES, separator=";"),
+        START,
+    ),
     "a web server's": (table("time,v", stamps("%d/%b/%Y:%H:%M:%S +0000"), VALUES), START),
     "points": (table("Zeit;U", stamps("%d.%m.%Y %H:%M:%S"), commas(VALUES), separator=";"), START),
     "slashes, the year first": (table("t,v", stamps("%Y/%m/%d %H:%M"), VALUES), START),
-    "date and time of day": (table("date,clock,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), VALUES), START),
-    "year and day of year": (table("Year,DOY,Hour,Min,v", stamps("%Y"), stamps("%j"), stamps("%H"), stamps("%M"), VALUES), START),
-    "year, month and day": (table("YYYY,MM,DD,HH,mn,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES), START),
-    "a compact date and a time of day": (table("Date,Time,v", stamps("%Y%m%d"), stamps("%H:%M:%S"), VALUES), START),
-    "months and minutes": (table("YYYY,MM,DD,hh,mm,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES), START),
-    "a date in the first row of the day": (table("date,clock,v", ["2024-03-01"] + [""] * (N - 1), stamps("%H:%M:%S"), VALUES), START),
-    "a date, hours and minutes": (table("date,hour,minute,v", stamps("%Y-%m-%d"), *(stamps(f"%{part}") for part in "HM"), VALUES), START),
-    "whole seconds and milliseconds": (table("time,ms,v", stamps("%Y-%m-%d %H:%M:%S"), [70] * N, VALUES), START + pd.Timedelta("70ms")),
-    "half days in a column": (table("day,clock,half,v", stamps("%d.%m.%Y"), stamps("%I:%M:%S"), stamps("%p"), VALUES), START),
-    "years of two digits": (table("Zeit;v", stamps("%d.%m.%y %H:%M"), commas(VALUES), separator=";"), START),
-    "years of two digits behind letters": (table("time,v", stamps("%d-%b-%y %H:%M"), VALUES), START),
-    "midnight as hour 24": (table("time,v", stamps("%Y-%m-%d %H:%M"), VALUES).replace("2024-03-01 00:00", "2024-02-29 24:00"), START),
+    "date and time of day": (
+        table("date,clock,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), VALUES),
+        START,
+    ),
+    "year and day of year": (
+        table(
+            "Year,DOY,Hour,Min,v", stamps("%Y"), stamps("%j"), stamps("%H"), stamps("%M"), VALUES
+        ),
+        START,
+    ),
+    "year, month and day": (
+        table("YYYY,MM,DD,HH,mn,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES),
+        START,
+    ),
+    "a compact date and a time of day": (
+        table("Date,Time,v", stamps("%Y%m%d"), stamps("%H:%M:%S"), VALUES),
+        START,
+    ),
+    "months and minutes": (
+        table("YYYY,MM,DD,hh,mm,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES),
+        START,
+    ),
+    "a date in the first row of the day": (
+        table("date,clock,v", ["2024-03-01"] + [""] * (N - 1), stamps("%H:%M:%S"), VALUES),
+        START,
+    ),
+    "a date, hours and minutes": (
+        table(
+            "date,hour,minute,v", stamps("%Y-%m-%d"), *(stamps(f"%{part}") for part in "HM"), VALUES
+        ),
+        START,
+    ),
+    "whole seconds and milliseconds": (
+        table("time,ms,v", stamps("%Y-%m-%d %H:%M:%S"), [70] * N, VALUES),
+        START + pd.Timedelta("70ms"),
+    ),
+    "half days in a column": (
+        table("day,clock,half,v", stamps("%d.%m.%Y"), stamps("%I:%M:%S"), stamps("%p"), VALUES),
+        START,
+    ),
+    "years of two digits": (
+        table("Zeit;v", stamps("%d.%m.%y %H:%M"), commas(VALUES), separator=";"),
+        START,
+    ),
+    "years of two digits behind letters": (
+        table("time,v", stamps("%d-%b-%y %H:%M"), VALUES),
+        START,
+    ),
+    "midnight as hour 24": (
+        table("time,v", stamps("%Y-%m-%d %H:%M"), VALUES).replace(
+            "2024-03-01 00:00", "2024-02-29 24:00"
+        ),
+        START,
+    ),
     "names that count": (table(",0", MINUTES, VALUES), START),
     "an oscilloscope's": (table("x-axis,1\nsecond,Volt", SECONDS, VALUES), ZERO),
-    "a date with a blank between blanks": (table("time v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=" "), START),
+    "a date with a blank between blanks": (
+        table("time v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=" "),
+        START,
+    ),
     "milliseconds since boot": (table("time_boot_ms,v", 1000 * SECONDS, VALUES), ZERO),
-    "seconds of the day": (table("year,doy,sod,v", stamps("%Y"), stamps("%j"), SECONDS, VALUES), START),
+    "seconds of the day": (
+        table("year,doy,sod,v", stamps("%Y"), stamps("%j"), SECONDS, VALUES),
+        START,
+    ),
     "milliseconds in a third column": (
         table("date,clock,ms,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), [70] * N, VALUES),
         START + pd.Timedelta("70ms"),
     ),
-    "a unit below the name": (table("Time,v", 1000 * SECONDS, VALUES).replace("v\n", "v\n[ms],V\n", 1), ZERO),
-    "a unit and a blank line below the name": (table("Time,v", SECONDS / 60, VALUES).replace("v\n", "v\n(min),V\n\n", 1), ZERO),
+    "a unit below the name": (
+        table("Time,v", 1000 * SECONDS, VALUES).replace("v\n", "v\n[ms],V\n", 1),
+        ZERO,
+    ),
+    "a unit and a blank line below the name": (
+        table("Time,v", SECONDS / 60, VALUES).replace("v\n", "v\n(min),V\n\n", 1),
+        ZERO,
+    ),
     "a sign for the row number": (table("#,time,v", range(N), MINUTES, VALUES), START),
     "MATLAB's comments": (table("% Time, v", SECONDS, VALUES, above="% Model: a\n"), ZERO),
     "names in two lines": (table(",v", MINUTES, VALUES).replace(",v\n", ",v\ntime,V\n", 1), START),
@@ -100,41 +160,100 @@ READ = {
     "seconds written out": (table("Time,v", [f"{second} sec" for second in SECONDS], VALUES), ZERO),
     "a temperature beside the time": (table("time,T", SECONDS, VALUES), ZERO),
     "milliseconds since 1970": (table("timestamp,v", TIMES.as_unit("ms").asi8, VALUES), START),
-    "modified Julian dates": (table("MJD,v", [f"{60370 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
-    "Julian dates": (table("JD,v", [f"{2460370.5 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
-    "MATLAB's days": (table("datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
-    "the time once more": (table("date,epoch,v", stamps("%Y-%m-%d %H:%M:%S"), TIMES.as_unit("s").asi8, VALUES), START),
-    "numbers of a server's entries": (table("time,entry_id,v", UTC, range(700, 700 + N), VALUES), START),
-    "quality after capitals": (table("time,v,OPCQuality", UTC, VALUES, [192] * N), START),
-    "an offset in the name": (table('"Time, GMT+02:30",v', stamps("%Y-%m-%d %H:%M"), VALUES), START - pd.Timedelta("2.5h")),
-    "row numbers of pandas": (table("Unnamed: 0,time,v", range(N), UTC, VALUES), START),
-    "a spreadsheet's first line": (table("time;v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=";", above="\ufeffsep=;\n"), START),
-    "names and units": (table("time,v", UTC, VALUES).replace("v\n", "v\n(UTC),V\n", 1), START),
-    "a logger's four lines": (table('TOA5,"a","7"\n"TIMESTAMP","RECORD","v"\n"TS","RN","V"\n"","","Smp"', UTC, range(N), VALUES), START),
-    "lines about the measurement": (table("Version\t2\n***End***\t\n\nX_Value\tv", SECONDS, commas(VALUES), separator="\t"), ZERO),
-    "NumPy's": (table("# time v", [f"{second:.6e}" for second in SECONDS], VALUES, separator=" "), ZERO),
-    "NumPy's, with units": (table("# t [s]  v", SECONDS, VALUES, separator=" "), ZERO),
-    "names and units in comments": (
-        table("#YY MM DD hh mm v\n#- - - - - m/s", *(stamps(f"%{part}") for part in "YmdHM"), VALUES, separator=" "),
+    "modified Julian dates": (
+        table("MJD,v", [f"{60370 + second / 86400:.9f}" for second in SECONDS], VALUES),
         START,
     ),
-    "day of year in UTC": (table("UTC,v", [f"{text[:-3]}Z" for text in stamps("%Y-%jT%H:%M:%S.%f")], VALUES), START),
+    "Julian dates": (
+        table("JD,v", [f"{2460370.5 + second / 86400:.9f}" for second in SECONDS], VALUES),
+        START,
+    ),
+    "MATLAB's days": (
+        table("datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS], VALUES),
+        START,
+    ),
+    "the time once more": (
+        table("date,epoch,v", stamps("%Y-%m-%d %H:%M:%S"), TIMES.as_unit("s").asi8, VALUES),
+        START,
+    ),
+    "numbers of a server's entries": (
+        table("time,entry_id,v", UTC, range(700, 700 + N), VALUES),
+        START,
+    ),
+    "quality after capitals": (table("time,v,OPCQuality", UTC, VALUES, [192] * N), START),
+    "an offset in the name": (
+        table('"Time, GMT+02:30",v', stamps("%Y-%m-%d %H:%M"), VALUES),
+        START - pd.Timedelta("2.5h"),
+    ),
+    "row numbers of pandas": (table("Unnamed: 0,time,v", range(N), UTC, VALUES), START),
+    "a spreadsheet's first line": (
+        table("time;v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=";", above="\ufeffsep=;\n"),
+        START,
+    ),
+    "names and units": (table("time,v", UTC, VALUES).replace("v\n", "v\n(UTC),V\n", 1), START),
+    "a logger's four lines": (
+        table(
+            'TOA5,"a","7"\n"TIMESTAMP","RECORD","v"\n"TS","RN","V"\n"","","Smp"',
+            UTC,
+            range(N),
+            VALUES,
+        ),
+        START,
+    ),
+    "lines about the measurement": (
+        table("Version\t2\n***End***\t\n\nX_Value\tv", SECONDS, commas(VALUES), separator="\t"),
+        ZERO,
+    ),
+    "NumPy's": (
+        table("# time v", [f"{second:.6e}" for second in SECONDS], VALUES, separator=" "),
+        ZERO,
+    ),
+    "NumPy's, with units": (table("# t [s]  v", SECONDS, VALUES, separator=" "), ZERO),
+    "names and units in comments": (
+        table(
+            "#YY MM DD hh mm v\n#- - - - - m/s",
+            *(stamps(f"%{part}") for part in "YmdHM"),
+            VALUES,
+            separator=" ",
+        ),
+        START,
+    ),
+    "day of year in UTC": (
+        table("UTC,v", [f"{text[:-3]}Z" for text in stamps("%Y-%jT%H:%M:%S.%f")], VALUES),
+        START,
+    ),
     "a log cut by a power failure": (table("time,v", UTC, VALUES, below="\x00" * 300), START),
     "commas behind each line": (table("time,v,", UTC, VALUES, [""] * N), START),
     "a name without cells": (table("time,v,comment", UTC, VALUES), START),
     "tabs": (table("time\tv", UTC, VALUES, separator="\t"), START),
     "bars": (table("time|v", UTC, VALUES, separator="|"), START),
-    "quoted decimal commas": (table("time,v", UTC, [f'"{value}"' for value in commas(VALUES)]), START),
+    "quoted decimal commas": (
+        table("time,v", UTC, [f'"{value}"' for value in commas(VALUES)]),
+        START,
+    ),
     "a byte order mark": ("\ufeff" + table("time,v", UTC, VALUES), START),
-    "comments above": (table("time,v", UTC, VALUES, above="# written by a recorder\n#units,V\n\n"), START),
+    "comments above": (
+        table("time,v", UTC, VALUES, above="# written by a recorder\n#units,V\n\n"),
+        START,
+    ),
     "spaces in the header": (table("time, v", UTC, VALUES), START),
     "lines of another system": (table("time,v", UTC, VALUES).replace("\n", "\r\n"), START),
     "a stray carriage return": ("\r" + table("time,v", UTC, VALUES), START),
     "no end of the last line": (table("time,v", UTC, VALUES).rstrip("\n"), START),
     "the time last, and words": (table("v,state,when", VALUES, ["on"] * N, UTC), START),
-    "files joined with their headers": (table("time,v", UTC, VALUES).replace("\n2024-03-01T00:30", "\ntime,v\n2024-03-01T00:30"), START),
+    "files joined with their headers": (
+        table("time,v", UTC, VALUES).replace("\n2024-03-01T00:30", "\ntime,v\n2024-03-01T00:30"),
+        START,
+    ),
     "a stop of WinCC": (
-        table("VarName;TimeString;VarValue", ["T"] * N, UTC, VALUES, separator=";", below="$RT_OFF$;2024-03-01T01:00:00Z;0\n"),
+        table(
+            "VarName;TimeString;VarValue",
+            ["T"] * N,
+            UTC,
+            VALUES,
+            separator=";",
+            below="$RT_OFF$;2024-03-01T01:00:00Z;0\n",
+        ),
         START,
     ),
     "units behind all numbers": (table("time,v", UTC, [f"{value} °C" for value in VALUES]), START),
@@ -146,10 +265,17 @@ READ = {
 def test_a_form_is_read_with_its_times_and_values(tmp_path, form):
     text, start = READ[form]
     (tmp_path / "a.csv").write_text(text, encoding="utf-8", newline="")
-    values = np.where(VALUES == VALUES[30], (VALUES[29] + VALUES[31]) / 2, VALUES) if form == "NaN of C" else VALUES
+    values = (
+        np.where(VALUES == VALUES[30], (VALUES[29] + VALUES[31]) / 2, VALUES)
+        if form == "NaN of C"
+        else VALUES
+    )
     report = check(only(read_source(tmp_path / "a.csv")), values, start)
     clock = report.findings[0]
-    assert clock.kind == "clock" and clock.details["last_ns"] - clock.details["first_ns"] == (N - 1) * 60 * 10**9
+    assert (
+        clock.kind == "clock"
+        and clock.details["last_ns"] - clock.details["first_ns"] == (N - 1) * 60 * 10**9
+    )
 
 
 def dates(form, days):
@@ -158,30 +284,60 @@ def dates(form, days):
 
 # form: text, words of the refusal, how it is read as the message says, the interval then
 ASKED = {
-    "a ramp": (table("counter,v", 5 * np.arange(N), VALUES), "--time counter", {"time": "counter"}, 5),
-    "a name that is no clock's": (table("T,v", 5 * np.arange(N), VALUES), "--time T", {"time": "T"}, 5),
+    "a ramp": (
+        table("counter,v", 5 * np.arange(N), VALUES),
+        "--time counter",
+        {"time": "counter"},
+        5,
+    ),
+    "a name that is no clock's": (
+        table("T,v", 5 * np.arange(N), VALUES),
+        "--time T",
+        {"time": "T"},
+        5,
+    ),
     "days of a spreadsheet": (
         table("Date,v", [f"{45352 + second / 86400:.8f}" for second in SECONDS], VALUES),
         "excel (from 2024-03-01",
         {"options": Cleaning(time_format="excel")},
         60,
     ),
-    "year and day in one number": (table("date,v", dates("%Y%j", 1), VALUES), "%Y%j", {"options": Cleaning(time_format="%Y%j")}, 86_400),
+    "year and day in one number": (
+        table("date,v", dates("%Y%j", 1), VALUES),
+        "%Y%j",
+        {"options": Cleaning(time_format="%Y%j")},
+        86_400,
+    ),
     "the time first": (
         table("time,v", stamps("%H:%M:%S %d-%m-%Y"), VALUES),
         "at line 2",
         {"options": Cleaning(time_format="%H:%M:%S %d-%m-%Y")},
         60,
     ),
-    "an unknown form of time": (table("when,v", stamps("%y-%jT%H:%M"), VALUES), "'24-061T00:00'", {"time": "none"}, 1),
-    "times since 1970 without a name": (table(",v", TIMES.as_unit("s").asi8, VALUES), "--time 'column 0'", {"time": "column 0"}, 60),
+    "an unknown form of time": (
+        table("when,v", stamps("%y-%jT%H:%M"), VALUES),
+        "'24-061T00:00'",
+        {"time": "none"},
+        1,
+    ),
+    "times since 1970 without a name": (
+        table(",v", TIMES.as_unit("s").asi8, VALUES),
+        "--time 'column 0'",
+        {"time": "column 0"},
+        60,
+    ),
     "date and hour in one number": (
         table("date,v", pd.date_range(START, periods=N, freq="h").strftime("%Y%m%d%H"), VALUES),
         "%Y%m%d%H",
         {"options": Cleaning(time_format="%Y%m%d%H")},
         3_600,
     ),
-    "two clocks": (table("event_time,received_time,v", MINUTES, MINUTES, VALUES), "event_time, received_time", {"time": "event_time"}, 60),
+    "two clocks": (
+        table("event_time,received_time,v", MINUTES, MINUTES, VALUES),
+        "event_time, received_time",
+        {"time": "event_time"},
+        60,
+    ),
     "states that change often": (
         table("time,mode,v", MINUTES, ["A", "B"] * 30, VALUES),
         "column mode",
@@ -191,42 +347,101 @@ ASKED = {
 }
 # form: text, words of the refusal
 REFUSED = {
-    "years of two digits in front or behind": (table("time,v", stamps("%y/%m/%d %H:%M"), VALUES), "'%d/%m/%y %H:%M' or '%y/%m/%d %H:%M'"),
+    "years of two digits in front or behind": (
+        table("time,v", stamps("%y/%m/%d %H:%M"), VALUES),
+        "'%d/%m/%y %H:%M' or '%y/%m/%d %H:%M'",
+    ),
     "decimal years": (table("time,v", 2020 + SECONDS / 86_400, VALUES), "decimal years or seconds"),
-    "times of day in numbers": (table("time,v", [f"12{minute:02d}00" for minute in range(N)], VALUES), "hhmmss or seconds"),
-    "microseconds since boot": (table("timestamp,v", 623_456_789 + 19_987 * np.arange(N), VALUES), "time_format 'ms' or 'us'"),
-    "seconds since 1904": (table("time,v", TIMES.as_unit("s").asi8 + 2_082_844_800, VALUES), "1980 to 2077"),
-    "seconds since 1980": (table("gps_time,v", TIMES.as_unit("s").asi8 - 315_964_782, VALUES), "--time gps_time"),
-    "seconds and nanoseconds": (table("sec,nanosec,v", TIMES.as_unit("s").asi8 // 120 * 120, [0, 500] * (N // 2), VALUES), "--time sec"),
-    "a zone beside the times": (table("time,tz_offset,v", MINUTES, ["+02:00"] * N, VALUES), "time, tz_offset in"),
+    "times of day in numbers": (
+        table("time,v", [f"12{minute:02d}00" for minute in range(N)], VALUES),
+        "hhmmss or seconds",
+    ),
+    "microseconds since boot": (
+        table("timestamp,v", 623_456_789 + 19_987 * np.arange(N), VALUES),
+        "time_format 'ms' or 'us'",
+    ),
+    "seconds since 1904": (
+        table("time,v", TIMES.as_unit("s").asi8 + 2_082_844_800, VALUES),
+        "1980 to 2077",
+    ),
+    "seconds since 1980": (
+        table("gps_time,v", TIMES.as_unit("s").asi8 - 315_964_782, VALUES),
+        "--time gps_time",
+    ),
+    "seconds and nanoseconds": (
+        table("sec,nanosec,v", TIMES.as_unit("s").asi8 // 120 * 120, [0, 500] * (N // 2), VALUES),
+        "--time sec",
+    ),
+    "a zone beside the times": (
+        table("time,tz_offset,v", MINUTES, ["+02:00"] * N, VALUES),
+        "time, tz_offset in",
+    ),
     "a zone in the name": (table("Time (CET),v", MINUTES, VALUES), "--timezone"),
     "one date past midnight": (
-        table("date,clock,v", ["2024-03-01"] * N, (TIMES + pd.Timedelta("23.5h")).strftime("%H:%M"), VALUES),
+        table(
+            "date,clock,v",
+            ["2024-03-01"] * N,
+            (TIMES + pd.Timedelta("23.5h")).strftime("%H:%M"),
+            VALUES,
+        ),
         "one day, as where a date stays past midnight, at line 32",
     ),
-    "days or months first": (table("time,v", dates("%d/%m/%Y", 31)[:2].repeat(N // 2), VALUES), "'%d/%m/%Y' or '%m/%d/%Y'"),
-    "a date and a time in numbers": (table("Date,Time,v", stamps("%Y%m%d"), stamps("%H%M%S"), VALUES), "one column"),
-    "a zone in letters": (table("time,v", stamps("%Y-%m-%d %H:%M CET"), VALUES), "offset such as +01:00"),
-    "a point where there are commas": (table("Zeit;U", stamps("%d.%m.%Y %H:%M"), ["1.234"] * N, separator=";"), "'1.234'"),
+    "days or months first": (
+        table("time,v", dates("%d/%m/%Y", 31)[:2].repeat(N // 2), VALUES),
+        "'%d/%m/%Y' or '%m/%d/%Y'",
+    ),
+    "a date and a time in numbers": (
+        table("Date,Time,v", stamps("%Y%m%d"), stamps("%H%M%S"), VALUES),
+        "one column",
+    ),
+    "a zone in letters": (
+        table("time,v", stamps("%Y-%m-%d %H:%M CET"), VALUES),
+        "offset such as +01:00",
+    ),
+    "a point where there are commas": (
+        table("Zeit;U", stamps("%d.%m.%Y %H:%M"), ["1.234"] * N, separator=";"),
+        "'1.234'",
+    ),
     "no names": (table("0.0,20.0", SECONDS[1:] + 0.5, VALUES[1:]), "--no-header"),
-    "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), "if the clock lost digits"),
-    "minutes where there are seconds": (table("time,v", ["2024-03-01 00:00", "2024-03-01 00:01"] * 30, VALUES), "2 different"),
+    "digits that a spreadsheet dropped": (
+        table("time,v", ["1.70925E+12"] * N, VALUES),
+        "if the clock lost digits",
+    ),
+    "minutes where there are seconds": (
+        table("time,v", ["2024-03-01 00:00", "2024-03-01 00:01"] * 30, VALUES),
+        "2 different",
+    ),
     "thousands or decimals": (table("time;v", MINUTES, ["1,500"] * N, separator=";"), "--decimal"),
-    "points and commas": (table("time;v;w", MINUTES, commas(VALUES), VALUES, separator=";"), "a point in 'w'"),
-    "a longer line": (table("time,v", MINUTES, VALUES).replace(f",{VALUES[5]}\n", ",1,2,3\n", 1), "line 7 has 4"),
+    "points and commas": (
+        table("time;v;w", MINUTES, commas(VALUES), VALUES, separator=";"),
+        "a point in 'w'",
+    ),
+    "a longer line": (
+        table("time,v", MINUTES, VALUES).replace(f",{VALUES[5]}\n", ",1,2,3\n", 1),
+        "line 7 has 4",
+    ),
     "a cell that is left out between blanks": (
         table("t v w", SECONDS, VALUES, VALUES, separator=" ").replace(f" {VALUES[5]}", "", 1),
         "line 7 has 2",
     ),
-    "a clock that begins again": (table("time,v", [*range(40), *np.arange(0.5, 20)], VALUES), "at line 42"),
-    "a sum at the end": (table("time,v", UTC, VALUES, below="Average,20.1\n"), "'Average' at line 62"),
+    "a clock that begins again": (
+        table("time,v", [*range(40), *np.arange(0.5, 20)], VALUES),
+        "at line 42",
+    ),
+    "a sum at the end": (
+        table("time,v", UTC, VALUES, below="Average,20.1\n"),
+        "'Average' at line 62",
+    ),
     "a time of day": (table("time,v", stamps("%H:%M:%S"), VALUES), "column of dates"),
     "another unit behind some numbers": (
         table("time,v", SECONDS, [f"{value} {'V' if value > 16 else 'mV'}" for value in VALUES]),
         f"mV' at line {2 + np.argmax(VALUES <= 16)}",
     ),
     "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), "'v' more than once"),
-    "numbered sensors": (table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)), "--series-column sensor_id"),
+    "numbered sensors": (
+        table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)),
+        "--series-column sensor_id",
+    ),
 }
 
 
@@ -252,7 +467,9 @@ def test_a_number_and_its_quality_in_one_cell_are_no_decimal(tmp_path):
 
 
 def test_units_that_change_from_row_to_row_tell_series_apart():
-    channels = read_source(pd.DataFrame({"time": TIMES, "v": VALUES, "unit": np.where(np.arange(N) < 30, "V", "mV")}))
+    channels = read_source(
+        pd.DataFrame({"time": TIMES, "v": VALUES, "unit": np.where(np.arange(N) < 30, "V", "mV")})
+    )
     check(channels["V"], VALUES[:30])
     check(channels["mV"], VALUES[30:], TIMES[30])
 
@@ -260,7 +477,10 @@ def test_units_that_change_from_row_to_row_tell_series_apart():
 def test_a_column_that_does_not_increase_is_no_clock(tmp_path):
     (tmp_path / "a.csv").write_text(table("T,p", VALUES, VALUES**2))
     channels = read_source(tmp_path / "a.csv")
-    assert list(channels) == ["T", "p"] and check(channels["T"], start=None, interval_s=1.0).find("clock").details["column"] is None
+    assert (
+        list(channels) == ["T", "p"]
+        and check(channels["T"], start=None, interval_s=1.0).find("clock").details["column"] is None
+    )
 
 
 @pytest.mark.parametrize("offset", ["+05", "+0530", "+05:30", "Z"])
@@ -268,7 +488,11 @@ def test_a_stated_offset_goes_before_the_option(tmp_path, offset):
     (tmp_path / "a.csv").write_text(table("time,v", stamps(f"%Y-%m-%d %H:%M:%S{offset}"), VALUES))
     hours = {"+05": 5, "Z": 0}.get(offset, 5.5)
     for zone in ("Asia/Tokyo", None):
-        report = check(only(read_source(tmp_path / "a.csv")), start=START - pd.Timedelta(hours=hours), options=Cleaning(timezone=zone))
+        report = check(
+            only(read_source(tmp_path / "a.csv")),
+            start=START - pd.Timedelta(hours=hours),
+            options=Cleaning(timezone=zone),
+        )
         clock = report.find("clock").text
         assert "stated" in clock and ("goes before Asia/Tokyo" in clock) == (zone is not None)
 
@@ -276,14 +500,26 @@ def test_a_stated_offset_goes_before_the_option(tmp_path, offset):
 def test_a_year_at_the_end_is_no_offset(tmp_path):
     (tmp_path / "a.csv").write_text(table("time,v", stamps("%H:%M:%S %d-%m-%Y"), VALUES))
     options = Cleaning(time_format="%H:%M:%S %d-%m-%Y", timezone="America/New_York")
-    check(only(read_source(tmp_path / "a.csv", options=options)), start=START + pd.Timedelta(hours=5), options=options)
+    check(
+        only(read_source(tmp_path / "a.csv", options=options)),
+        start=START + pd.Timedelta(hours=5),
+        options=options,
+    )
 
 
 @pytest.mark.parametrize("shift_s", [0, 7])
 @pytest.mark.parametrize("begin", ["2024-10-26T22:00Z", "2024-10-27T00:10Z"])
 def test_an_hour_that_a_clock_repeats_is_two_hours(tmp_path, begin, shift_s):
-    utc = pd.date_range(begin, periods=200, freq="10min") + pd.to_timedelta(shift_s * (np.arange(200) % 2), unit="s")
-    (tmp_path / "a.csv").write_text(table("time,v", utc.tz_convert("Europe/Berlin").strftime("%Y-%m-%d %H:%M:%S"), np.arange(200) % 7))
+    utc = pd.date_range(begin, periods=200, freq="10min") + pd.to_timedelta(
+        shift_s * (np.arange(200) % 2), unit="s"
+    )
+    (tmp_path / "a.csv").write_text(
+        table(
+            "time,v",
+            utc.tz_convert("Europe/Berlin").strftime("%Y-%m-%d %H:%M:%S"),
+            np.arange(200) % 7,
+        )
+    )
     options = Cleaning(timezone="Europe/Berlin")
     cleaned = clean(only(read_source(tmp_path / "a.csv", options=options)), options)
     assert (cleaned.report.rows_used, len(cleaned.parts)) == (200, 1)
@@ -292,7 +528,9 @@ def test_an_hour_that_a_clock_repeats_is_two_hours(tmp_path, begin, shift_s):
 
 def long(**keys):
     """Two series at the same times, told apart by columns of words; the second is 9 higher."""
-    frame = pd.DataFrame({"time": TIMES.repeat(2), **{name: list(words) * N for name, words in keys.items()}})
+    frame = pd.DataFrame(
+        {"time": TIMES.repeat(2), **{name: list(words) * N for name, words in keys.items()}}
+    )
     return frame.assign(v=VALUES.repeat(2) + np.tile([0, 9], N))
 
 
@@ -301,7 +539,9 @@ SERIES = {
     "one after the other": long(host=("a", "b")).sort_values("host", kind="stable"),
     "a column of another name": long(which=("a", "b")),
     "two columns that say the same": long(sensor=("a", "b"), place=("north", "south")),
-    "other times": long(host=("a", "b")).assign(time=TIMES.repeat(2) + pd.to_timedelta(np.tile([0, 30], N), unit="s")),
+    "other times": long(host=("a", "b")).assign(
+        time=TIMES.repeat(2) + pd.to_timedelta(np.tile([0, 30], N), unit="s")
+    ),
 }
 
 
@@ -311,7 +551,9 @@ def test_several_series_in_one_table_are_told_apart(tmp_path, form):
     channels = read_source(tmp_path / "a.csv")
     assert list(channels) == ["a", "b"]
     check(channels["a"])
-    report = check(channels["b"], VALUES + 9, START + pd.Timedelta("30s" if form == "other times" else "0s"))
+    report = check(
+        channels["b"], VALUES + 9, START + pd.Timedelta("30s" if form == "other times" else "0s")
+    )
     assert report.find("series").count == 2
 
 
@@ -322,7 +564,19 @@ def test_a_named_column_of_several_series_is_told_apart_too():
 
 
 def test_a_state_is_no_key_of_series():
-    check(only(read_source(pd.DataFrame({"time": TIMES, "mode": np.where(np.arange(N) % 20 < 10, "sun", "eclipse"), "v": VALUES}))))
+    check(
+        only(
+            read_source(
+                pd.DataFrame(
+                    {
+                        "time": TIMES,
+                        "mode": np.where(np.arange(N) % 20 < 10, "sun", "eclipse"),
+                        "v": VALUES,
+                    }
+                )
+            )
+        )
+    )
 
 
 def test_a_blank_line_at_the_end_of_several_series_is_none_of_them(tmp_path):
@@ -331,22 +585,32 @@ def test_a_blank_line_at_the_end_of_several_series_is_none_of_them(tmp_path):
         for number, field in enumerate(("amps", "volts"))
         for time, value in zip(TIMES.strftime("%Y-%m-%dT%H:%M:%SZ"), VALUES + number, strict=True)
     ]
-    (tmp_path / "export.csv").write_text("\r\n".join([",result,table,_time,_value,_field", *rows]) + "\r\n\r\n")
+    (tmp_path / "export.csv").write_text(
+        "\r\n".join([",result,table,_time,_value,_field", *rows]) + "\r\n\r\n"
+    )
     channels = read_source(tmp_path / "export.csv")
     assert list(channels) == ["amps", "volts"]
-    assert [series.to_list() for series in channels.values()] == [VALUES.tolist(), (VALUES + 1).tolist()]
+    assert [series.to_list() for series in channels.values()] == [
+        VALUES.tolist(),
+        (VALUES + 1).tolist(),
+    ]
 
 
 def test_the_columns_of_series_and_values_can_be_named():
     frame, options = long(number=(7, 8)).assign(other=1.0), Cleaning(series_column="number")
     channels = read_source(frame, ["v"], options=options)
-    assert list(channels) == ["7", "8"] and list(read_source(frame, ["8.v"], options=options)) == ["8.v"]
+    assert list(channels) == ["7", "8"] and list(read_source(frame, ["8.v"], options=options)) == [
+        "8.v"
+    ]
     check(channels["8"], VALUES + 9)
 
 
 def annotated(field, values, result="_result"):
     head = f"#group,false,false,true,false,true\n#datatype,string,long,dateTime:RFC3339,double,string\n#default,{result},,,,\n"
-    rows = [f",,0,{time:%Y-%m-%dT%H:%M:%SZ},{value},{field}" for time, value in zip(TIMES, values, strict=True)]
+    rows = [
+        f",,0,{time:%Y-%m-%dT%H:%M:%SZ},{value},{field}"
+        for time, value in zip(TIMES, values, strict=True)
+    ]
     return head + ",result,table,_time,_value,_field\n" + "\n".join(rows) + "\n\n"
 
 
@@ -356,8 +620,12 @@ def test_tables_of_annotated_csv_are_series(tmp_path):
     assert list(channels) == ["volts", "amps"]
     check(channels["volts"])
     check(channels["amps"], 2 * VALUES)
-    assert channels["amps"].attrs["places"].of(0) == "line 70 of a.csv"  # 3 annotations, names, 60 rows, a blank line, and 4 more
-    (tmp_path / "b.csv").write_text(annotated("volts", VALUES, "mean") + annotated("volts", 2 * VALUES, "max"))
+    assert (
+        channels["amps"].attrs["places"].of(0) == "line 70 of a.csv"
+    )  # 3 annotations, names, 60 rows, a blank line, and 4 more
+    (tmp_path / "b.csv").write_text(
+        annotated("volts", VALUES, "mean") + annotated("volts", 2 * VALUES, "max")
+    )
     assert list(read_source(tmp_path / "b.csv")) == ["mean", "max"]
 
 
@@ -379,8 +647,19 @@ def test_labels_are_no_channel_and_mark_rows(name, form):
     assert (missing.find("missing values").rows_left_out, missing.samples) == (3, N)
 
 
-BY_HAND = [([0, 1, 2], [0, 1, 1]), ([0, np.nan, 1], [0, 0, 1]), ([1, 1], [1, 1]), ([-1, 1, np.nan], [1, 0, 0]), ([2, 3], None)]
-BY_HAND += [([np.nan, np.nan], [0, 0]), (["normal", "attack", None], [0, 1, 0]), (["attack", None], [1, 0]), (["high", "low"], None)]
+BY_HAND = [
+    ([0, 1, 2], [0, 1, 1]),
+    ([0, np.nan, 1], [0, 0, 1]),
+    ([1, 1], [1, 1]),
+    ([-1, 1, np.nan], [1, 0, 0]),
+    ([2, 3], None),
+]
+BY_HAND += [
+    ([np.nan, np.nan], [0, 0]),
+    (["normal", "attack", None], [0, 1, 0]),
+    (["attack", None], [1, 0]),
+    (["high", "low"], None),
+]
 
 
 @pytest.mark.parametrize(("cells", "expected"), BY_HAND)
@@ -391,17 +670,34 @@ def test_what_a_label_says_by_hand(cells, expected):
 
 def test_a_label_may_be_named_or_refused_and_may_concern_one_channel():
     marks = LABELS["zeros and ones"]
-    frame = pd.DataFrame({"time": TIMES, "ch1": VALUES, "ch2": -VALUES, "is_anomaly_ch1": marks, "state": marks})
+    frame = pd.DataFrame(
+        {"time": TIMES, "ch1": VALUES, "ch2": -VALUES, "is_anomaly_ch1": marks, "state": marks}
+    )
     channels = read_source(frame, ["ch1", "ch2"])
-    assert [clean(series).report.find("labels") is None for series in channels.values()] == [False, True]
+    assert [clean(series).report.find("labels") is None for series in channels.values()] == [
+        False,
+        True,
+    ]
     named = read_source(frame, options=Cleaning(label_column="state"))
-    assert list(named) == ["ch1", "ch2", "is_anomaly_ch1"] and clean(named["ch2"]).report.find("labels").count == 3
+    assert (
+        list(named) == ["ch1", "ch2", "is_anomaly_ch1"]
+        and clean(named["ch2"]).report.find("labels").count == 3
+    )
     assert "state" in read_source(frame, options=Cleaning(label_column="none"))
 
 
 def test_quality_flags_and_counts_beside_a_clock_are_named_and_left_out():
-    report = check(only(read_source(pd.DataFrame({"time": TIMES, "v": VALUES, "v_quality": 192, "number": range(N)}))))
-    assert "v_quality" in report.find("quality flags").text and "number" in report.find("row numbers").text
+    report = check(
+        only(
+            read_source(
+                pd.DataFrame({"time": TIMES, "v": VALUES, "v_quality": 192, "number": range(N)})
+            )
+        )
+    )
+    assert (
+        "v_quality" in report.find("quality flags").text
+        and "number" in report.find("row numbers").text
+    )
 
 
 @pytest.mark.parametrize("fill", [9999.0, -999.9, 1e20])
@@ -416,10 +712,19 @@ def test_fill_values_are_reported_and_left_out_when_named(fill):
 @pytest.mark.parametrize(("others", "is_found"), [(10, True), (9, False)])
 def test_a_value_without_usual_digits_is_a_fill_value_beside_at_least_ten_others(others, is_found):
     values = np.where(np.arange(N) % 20 == 5, 100.0, np.arange(N) % others)
-    assert (clean(pd.Series(values, index=TIMES)).report.find("fill values") is not None) == is_found
+    assert (
+        clean(pd.Series(values, index=TIMES)).report.find("fill values") is not None
+    ) == is_found
 
 
-@pytest.mark.parametrize("values", [VALUES, np.where(np.arange(N) % 20 == 5, 100.0, 0.0), np.where(np.arange(N) == 5, 9999.0, VALUES)])
+@pytest.mark.parametrize(
+    "values",
+    [
+        VALUES,
+        np.where(np.arange(N) % 20 == 5, 100.0, 0.0),
+        np.where(np.arange(N) == 5, 9999.0, VALUES),
+    ],
+)
 def test_states_and_single_spikes_are_no_fill_values(values):
     assert clean(pd.Series(values, index=TIMES)).report.find("fill values") is None
 
@@ -427,17 +732,23 @@ def test_states_and_single_spikes_are_no_fill_values(values):
 def test_one_decimal_sign_holds_for_all_columns(tmp_path):
     watts = 950 + np.arange(N)
     written = [f"{watt // 1000}.{watt % 1000:03d}" if watt >= 1000 else str(watt) for watt in watts]
-    (tmp_path / "a.csv").write_text(table("time;watts;celsius", MINUTES, written, commas(VALUES), separator=";"))
+    (tmp_path / "a.csv").write_text(
+        table("time;watts;celsius", MINUTES, written, commas(VALUES), separator=";")
+    )
     channels = read_source(tmp_path / "a.csv")
     check(channels["watts"], watts)
     check(channels["celsius"])
-    shown = [f'"{watt // 1000},{watt % 1000:03d}.5"' if watt >= 1000 else f"{watt}.5" for watt in watts]
+    shown = [
+        f'"{watt // 1000},{watt % 1000:03d}.5"' if watt >= 1000 else f"{watt}.5" for watt in watts
+    ]
     (tmp_path / "b.csv").write_text(table("time,watts", MINUTES, shown))
     check(only(read_source(tmp_path / "b.csv")), watts + 0.5)
 
 
 def test_steps_are_measured_before_gaps_are_filled():
-    values = pd.Series(np.tile(VALUES.round(1), 20), index=pd.date_range(START, periods=20 * N, freq="s"))
+    values = pd.Series(
+        np.tile(VALUES.round(1), 20), index=pd.date_range(START, periods=20 * N, freq="s")
+    )
     values = values.drop(values.index[: 60 * 20 : 20])
     assert clean(values).report.find("quantised").details["step"] == pytest.approx(0.1)
 
@@ -447,7 +758,11 @@ PLAIN = table("time,v", UTC, VALUES)
 
 def days(folder):
     lines = PLAIN.splitlines(keepends=True)
-    for name, part in (("day1.csv", lines[1:31]), ("day2.csv", lines[31:50]), ("day10.csv", lines[50:])):
+    for name, part in (
+        ("day1.csv", lines[1:31]),
+        ("day2.csv", lines[31:50]),
+        ("day10.csv", lines[50:]),
+    ):
         (folder / name).write_text("".join([lines[0], *part]))
     return folder
 
@@ -480,7 +795,12 @@ def test_packed_files_are_read(tmp_path, refused):
 def test_a_workbook_is_read_with_its_dates(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
-    for row in (["Station 7"], [], ["Zeit", "Spannung"], *zip(TIMES.tz_localize(None), VALUES, strict=True)):
+    for row in (
+        ["Station 7"],
+        [],
+        ["Zeit", "Spannung"],
+        *zip(TIMES.tz_localize(None), VALUES, strict=True),
+    ):
         book.active.append(list(row))
     book.save(tmp_path / "a.xlsx")
     series = only(read_source(tmp_path / "a.xlsx"))
@@ -503,7 +823,9 @@ def test_pandas_objects_are_sources():
     frame = pd.DataFrame({"time": TIMES, "v": VALUES})
     check(only(read_source(frame)))
     check(only(read_source(frame.set_index("time")["v"])))
-    parts = frame.assign(year=2024, month=3, day=1, second=SECONDS)[["year", "month", "day", "second", "v"]]
+    parts = frame.assign(year=2024, month=3, day=1, second=SECONDS)[
+        ["year", "month", "day", "second", "v"]
+    ]
     check(only(read_source(parts.iloc[5:])), VALUES[5:], TIMES[5])
 
 
@@ -518,12 +840,24 @@ def test_the_files_of_this_tool_are_read_back(tmp_path, form):
 
 
 def test_scores_of_this_tool_are_no_channels():
-    frame = pd.DataFrame({"time": TIMES, "value": VALUES, "score": VALUES / 30, "flag": VALUES > 24, "score_after": VALUES / 40})
+    frame = pd.DataFrame(
+        {
+            "time": TIMES,
+            "value": VALUES,
+            "score": VALUES / 30,
+            "flag": VALUES > 24,
+            "score_after": VALUES / 40,
+        }
+    )
     assert list(read_source(frame)) == ["value"]
 
 
 def test_copies_of_a_run_are_series():
-    frame = long(copy=(0, 1)).rename(columns={"v": "value"}).assign(out_of_range=0.5, scenario="worn", severity=0.5, mask=1)
+    frame = (
+        long(copy=(0, 1))
+        .rename(columns={"v": "value"})
+        .assign(out_of_range=0.5, scenario="worn", severity=0.5, mask=1)
+    )
     channels = read_source(frame)
     assert list(channels) == ["copy 0", "copy 1"]
     check(channels["copy 1"], VALUES + 9)
@@ -537,14 +871,22 @@ def test_names_may_be_missing(tmp_path):
 
 
 def test_whole_and_fractional_seconds_are_read_in_one_column(tmp_path):
-    times = [time.strftime("%d.%m.%Y %H:%M:%S") + ("" if row % 2 else ",250") for row, time in enumerate(TIMES)]
+    times = [
+        time.strftime("%d.%m.%Y %H:%M:%S") + ("" if row % 2 else ",250")
+        for row, time in enumerate(TIMES)
+    ]
     (tmp_path / "a.csv").write_text(table("time;v", times, VALUES, separator=";"))
     index = only(read_source(tmp_path / "a.csv")).index
-    assert (index[0] - START.tz_localize(None), index[1] - index[0]) == (pd.Timedelta("250ms"), pd.Timedelta("59.75s"))
+    assert (index[0] - START.tz_localize(None), index[1] - index[0]) == (
+        pd.Timedelta("250ms"),
+        pd.Timedelta("59.75s"),
+    )
 
 
 def test_a_year_and_a_month_are_the_first_day_of_the_month():
-    frame = pd.DataFrame({"year": 1990 + np.arange(N) // 12, "month": 1 + np.arange(N) % 12, "v": VALUES})
+    frame = pd.DataFrame(
+        {"year": 1990 + np.arange(N) // 12, "month": 1 + np.arange(N) % 12, "v": VALUES}
+    )
     assert only(read_source(frame)).index[-1] == pd.Timestamp("1994-12-01")
 
 

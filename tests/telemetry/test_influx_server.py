@@ -75,7 +75,9 @@ def _put(bucket, lines):
 
 def _flux(query):
     with _client() as client:
-        return [record.values for table in client.query_api().query(query) for record in table.records]
+        return [
+            record.values for table in client.query_api().query(query) for record in table.records
+        ]
 
 
 def _location(bucket, rest="wheel/speed"):
@@ -84,12 +86,17 @@ def _location(bucket, rest="wheel/speed"):
 
 def _points(number, seed=0, interval_ns=10**9):
     """Times and values of a series."""
-    return interval_ns * np.arange(number), np.random.default_rng(seed).normal(size=number).astype(np.float32)
+    return interval_ns * np.arange(number), np.random.default_rng(seed).normal(size=number).astype(
+        np.float32
+    )
 
 
 def test_every_finite_float32_comes_back_and_a_repeated_write_stores_it_once(bucket):
     bits = np.random.default_rng(0).integers(0, 2**32, 20_000, dtype=np.uint32).view(np.float32)
-    extremes = np.array([0, -0.0, 1e-45, -1e-45, 1.1754944e-38, 3.4028235e38, -3.4028235e38, 0.1, 16777217], np.float32)
+    extremes = np.array(
+        [0, -0.0, 1e-45, -1e-45, 1.1754944e-38, 3.4028235e38, -3.4028235e38, 0.1, 16777217],
+        np.float32,
+    )
     kept = np.concatenate([bits[np.isfinite(bits)], extremes])
     times = np.arange(len(kept)) + 1_583_020_800_123_456_789  # a nanosecond apart
     for _ in range(2):
@@ -103,11 +110,15 @@ def test_series_of_one_bucket_stay_apart(bucket):
     for number, place in enumerate(places):
         InfluxStore(_location(bucket, place)).write(*_points(50, number))
     for number, place in enumerate(places):
-        assert np.array_equal(InfluxStore(_location(bucket, place)).read()[1], _points(50, number)[1]), place
+        assert np.array_equal(
+            InfluxStore(_location(bucket, place)).read()[1], _points(50, number)[1]
+        ), place
 
 
 def test_places_with_hostile_names(bucket):
-    place = InfluxLocation(bucket, 'it\'s "m" ${1}\\n, a=b', 'f"\\g${h}, i=j', (('t"\\u${v}, w=x', 'y"\\z${0}, 1=2'),))
+    place = InfluxLocation(
+        bucket, 'it\'s "m" ${1}\\n, a=b', 'f"\\g${h}, i=j', (('t"\\u${v}, w=x', 'y"\\z${0}, 1=2'),)
+    )
     InfluxStore(place).write(*_points(30))
     assert np.array_equal(InfluxStore(str(place)).read()[1], _points(30)[1])
 
@@ -117,14 +128,21 @@ def test_a_series_of_another_program_is_read_unchanged(bucket):
     times = np.unique(rng.integers(10**18, 10**18 + 10**15, 3_000))
     values = rng.normal(size=len(times))
     order = rng.permutation(len(times))
-    _put(bucket, "\n".join(f"bus,craft=A volts={float(values[i])!r},amperes={i}i {times[i]}" for i in order))
+    _put(
+        bucket,
+        "\n".join(f"bus,craft=A volts={float(values[i])!r},amperes={i}i {times[i]}" for i in order),
+    )
     _put(bucket, f"bus,craft=B volts=7 {times[0]}")
     found, read = InfluxStore(_location(bucket, "bus/volts?craft=A")).read()
-    assert np.array_equal(found, times) and read.tobytes() == values.tobytes(), "float64 as it is kept"
+    assert np.array_equal(found, times) and read.tobytes() == values.tobytes(), (
+        "float64 as it is kept"
+    )
     ((name, channel),) = read_source(_location(bucket, "bus/volts?craft=A")).items()
     assert name == "volts" and (channel.index.asi8 == times).all() and (channel == values).all()
     found, read = InfluxStore(_location(bucket, "bus/amperes")).read()
-    assert np.array_equal(found, times) and np.array_equal(read, np.arange(len(times))), "whole numbers are numbers"
+    assert np.array_equal(found, times) and np.array_equal(read, np.arange(len(times))), (
+        "whole numbers are numbers"
+    )
 
 
 def test_anything_but_one_numeric_series_is_refused(bucket, refused):
@@ -139,8 +157,16 @@ def test_anything_but_one_numeric_series_is_refused(bucket, refused):
     assert len(read("bus/volts?craft=B")) == 1
     with refused("several", "craft=A&side=l", "craft=A&side=r"):
         read("bus/volts?craft=A")
-    for place in ("bis/volts", "bus/vlts", "bus/volts?craft=C", "bus/volts?kraft=A", "bus/volts?craft=B&side=l"):
-        with refused(f"Expected points at influxdb://{bucket.replace(' ', '%20')}/{place}. Received: none"):
+    for place in (
+        "bis/volts",
+        "bus/vlts",
+        "bus/volts?craft=C",
+        "bus/volts?kraft=A",
+        "bus/volts?craft=B&side=l",
+    ):
+        with refused(
+            f"Expected points at influxdb://{bucket.replace(' ', '%20')}/{place}. Received: none"
+        ):
             read(place)
     for place in ("bus/mode", "bus/on"):
         with refused("a field of numbers"):
@@ -149,8 +175,12 @@ def test_anything_but_one_numeric_series_is_refused(bucket, refused):
 
 def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, bucket, caplog):
     million = 10**6
-    values = np.random.default_rng(0).permutation(million).astype(np.float32)  # integers, whose sum is exact in any order
-    writing = threading.Thread(target=InfluxStore(_location(bucket)).write, args=(10**9 * np.arange(million), values))
+    values = (
+        np.random.default_rng(0).permutation(million).astype(np.float32)
+    )  # integers, whose sum is exact in any order
+    writing = threading.Thread(
+        target=InfluxStore(_location(bucket)).write, args=(10**9 * np.arange(million), values)
+    )
     writing.start()
     for _ in range(2):
         time.sleep(1)
@@ -166,7 +196,11 @@ def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, b
 
 @pytest.mark.parametrize(
     "use",
-    [lambda store: store.check(), lambda store: store.write(*_points(9)), lambda store: store.read()],
+    [
+        lambda store: store.check(),
+        lambda store: store.write(*_points(9)),
+        lambda store: store.read(),
+    ],
     ids=["check", "write", "read"],
 )
 def test_an_unknown_token_organisation_or_bucket_is_named(named, bucket, monkeypatch, refused, use):
@@ -184,12 +218,21 @@ def test_missing_samples_are_noticed(bucket, refused):
     store = InfluxTelemetry(_location(bucket))
     store.write(Telemetry(_points(1_000)[1], 1.0, start="2020-01-01T00:00:00Z"))
     with _client() as client:
-        client.delete_api().delete("2020-01-01T00:08:00Z", "2020-01-01T00:08:00Z", '_measurement="wheel"', bucket)
+        client.delete_api().delete(
+            "2020-01-01T00:08:00Z", "2020-01-01T00:08:00Z", '_measurement="wheel"', bucket
+        )
     with refused("1,000 samples", "999"):
         store.read()
 
 
-@pytest.mark.parametrize("token", ["not-the-right-one-0123456789", "lines-0123456789\ntwo-of-them-0123456789", "not-latin-€-0123456789"])
+@pytest.mark.parametrize(
+    "token",
+    [
+        "not-the-right-one-0123456789",
+        "lines-0123456789\ntwo-of-them-0123456789",
+        "not-latin-€-0123456789",
+    ],
+)
 def test_the_token_appears_nowhere(named, bucket, monkeypatch, caplog, capfd, token):
     told = io.StringIO()
     caplog.set_level(logging.DEBUG)
@@ -221,11 +264,28 @@ def test_the_reproduction_runs_through_influxdb(named, bucket, tmp_path, capsys)
     for name in ("first", "again", "deleted"):
         if name == "deleted":  # the stage counts as done, but its series is deleted from the server
             with _client() as client:
-                client.delete_api().delete("1970-01-01T00:00:00Z", "2200-01-01T00:00:00Z", '_measurement="paper"', bucket)
-        words = ["--budget", "smoke", "--only", "fig14", "--cache", tmp_path / "cache", "--store", place, "--out", tmp_path / name]
+                client.delete_api().delete(
+                    "1970-01-01T00:00:00Z", "2200-01-01T00:00:00Z", '_measurement="paper"', bucket
+                )
+        words = [
+            "--budget",
+            "smoke",
+            "--only",
+            "fig14",
+            "--cache",
+            tmp_path / "cache",
+            "--store",
+            place,
+            "--out",
+            tmp_path / name,
+        ]
         assert main([str(word) for word in words]) == 0
         assert ("(from the cache)" in capsys.readouterr().out) == (name != "first")
-        assert f"store {place} · " in (tmp_path / name / "fig14_telemetry_store.svg").read_text(encoding="utf-8")
-        assert [row["_value"] for row in _flux(count)] == [120_000], "they are there, and there once"
+        assert f"store {place} · " in (tmp_path / name / "fig14_telemetry_store.svg").read_text(
+            encoding="utf-8"
+        )
+        assert [row["_value"] for row in _flux(count)] == [120_000], (
+            "they are there, and there once"
+        )
     for file in tmp_path.rglob("*"):
         assert not file.is_file() or named.token.encode() not in file.read_bytes()

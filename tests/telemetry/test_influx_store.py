@@ -44,7 +44,9 @@ HEAD, ROW = b",result,table,_time,_value\r\n", b",_result,0,1970-01-01T00:00:01.
 
 
 ODD = {
-    "an error after the points": HEAD + ROW % (7, b"1") + b"\r\n#datatype,string,string\r\n,error,reference\r\n,out of memory,17\r\n",
+    "an error after the points": HEAD
+    + ROW % (7, b"1")
+    + b"\r\n#datatype,string,string\r\n,error,reference\r\n,out of memory,17\r\n",
     "words": HEAD + ROW % (7, b"safe"),
     "a time that is none": HEAD + b",_result,0,soon,1\r\n",
     "half a row": HEAD + b",_result,0\r\n",
@@ -72,7 +74,9 @@ def test_a_missing_client_is_named(pretended, monkeypatch, refused):
         InfluxStore("influxdb://b/m/f")
 
 
-URLS = "localhost:8086|ftp://localhost|http://|http://[|http://a:b|http://a:0|http://a b|http://a\n|http://u:secret@b".split("|")
+URLS = "localhost:8086|ftp://localhost|http://|http://[|http://a:b|http://a:0|http://a b|http://a\n|http://u:secret@b".split(
+    "|"
+)
 
 
 @pytest.mark.parametrize("url", URLS)
@@ -83,7 +87,10 @@ def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
     assert "secret" not in str(caught.value)
 
 
-@pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read(), lambda store: store.write(*POINTS)])
+@pytest.mark.parametrize(
+    "use",
+    [lambda store: store.check(), lambda store: store.read(), lambda store: store.write(*POINTS)],
+)
 def test_a_server_that_is_down_is_reported_at_once(pretended, refused, use):
     with refused("http://127.0.0.1:9", "no answer"):
         use(InfluxStore("influxdb://b/m/f"))
@@ -137,17 +144,33 @@ def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refu
         (["--store", "sqlite"], "parquet, influxdb"),
     ],
 )
-def test_an_unusable_store_is_reported_before_any_work(pretended, monkeypatch, tmp_path, options, word):
+def test_an_unusable_store_is_reported_before_any_work(
+    pretended, monkeypatch, tmp_path, options, word
+):
     if word == "INFLUXDB_V2_TOKEN":
         monkeypatch.delenv(word)
-    words = [*options, "--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]
+    words = [
+        *options,
+        "--budget",
+        "smoke",
+        "--out",
+        str(tmp_path / "out"),
+        "--cache",
+        str(tmp_path / "cache"),
+    ]
     program = f"""
 import sys
 from enhsim_tf.reproduce import main
 code = main({words!r})
 print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} & set(sys.modules)))
 """
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
     assert done.stdout == "2 []\n", done.stderr
-    assert len(done.stderr.splitlines()) == 1 and done.stderr.startswith("error: Expected ") and word in done.stderr
+    assert (
+        len(done.stderr.splitlines()) == 1
+        and done.stderr.startswith("error: Expected ")
+        and word in done.stderr
+    )
     assert not list(tmp_path.iterdir())

@@ -10,7 +10,9 @@ from enhsim_tf.telemetry.quantisation import Levels
 def test_the_levels_of_quantised_values_are_found(step):
     rng = np.random.default_rng(0)
     values = (step * np.round(rng.normal(20, 3, 5_000))).astype(np.float32)
-    values[100:103] += np.float32(step) * np.array([0.25, 0.5, 0.75], np.float32)  # an interpolated gap
+    values[100:103] += np.float32(step) * np.array(
+        [0.25, 0.5, 0.75], np.float32
+    )  # an interpolated gap
     found = Levels.find(values)
     assert found.step == pytest.approx(step, rel=1e-6) and 15 <= found.count <= 25
     kept = np.delete(values, np.arange(100, 103))
@@ -19,7 +21,10 @@ def test_the_levels_of_quantised_values_are_found(step):
 
 def test_values_off_the_grid_by_a_rounding_error_are_the_same_level():
     rng = np.random.default_rng(0)
-    grid, signal = 0.05 * rng.integers(-10, 11, (50, 200)), rng.uniform(-1, 1, (50, 200)).astype(np.float32)
+    grid, signal = (
+        0.05 * rng.integers(-10, 11, (50, 200)),
+        rng.uniform(-1, 1, (50, 200)).astype(np.float32),
+    )
     values = (grid + signal).astype(np.float32) - signal
     assert len(np.unique(values)) > 2 * 21
     found = Levels.find(values)
@@ -31,11 +36,15 @@ def test_values_off_the_grid_by_a_rounding_error_are_the_same_level():
     "values",
     [
         np.random.default_rng(0).standard_normal(5_000),
-        np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),  # values of a noise-free wave repeat too
+        np.tile(
+            np.sin(2 * np.pi * np.arange(50) / 50), 100
+        ),  # values of a noise-free wave repeat too
         np.clip(np.random.default_rng(0).standard_normal(5_000), -1, 1),  # a saturated sensor
         np.arange(20.0),
         np.random.default_rng(0).choice([0.0, 1.0, 1.7], 500),
-        np.random.default_rng(0).uniform(0, 1, 2_000_000),  # so dense that most neighbours differ by less than a millionth
+        np.random.default_rng(0).uniform(
+            0, 1, 2_000_000
+        ),  # so dense that most neighbours differ by less than a millionth
     ],
     ids=["noise", "wave", "clipped", "short", "uneven", "dense"],
 )
@@ -45,5 +54,7 @@ def test_values_that_are_not_quantised_have_no_levels(values):
 
 def test_values_are_rounded_to_the_nearest_level():
     levels = Levels(0.5, 0.1, 4)
-    np.testing.assert_allclose(levels.round(np.array([0.1, 0.34, 0.36, -0.2, 7.0])), [0.1, 0.1, 0.6, -0.4, 7.1], rtol=1e-6)
+    np.testing.assert_allclose(
+        levels.round(np.array([0.1, 0.34, 0.36, -0.2, 7.0])), [0.1, 0.1, 0.6, -0.4, 7.1], rtol=1e-6
+    )
     assert levels.round(np.zeros((2, 3))).dtype == np.float32

@@ -45,7 +45,9 @@ def test_numbers_of_any_kind_become_float32(dtype):
 
 
 def test_parts_keep_the_clock():
-    whole = Telemetry(np.arange(100, dtype=np.float32), interval_s=0.5, offset_s=7.0, start="2020-03-01", name="n")
+    whole = Telemetry(
+        np.arange(100, dtype=np.float32), interval_s=0.5, offset_s=7.0, start="2020-03-01", name="n"
+    )
     part = whole.part(30, 40).part(2, 5)
     assert part.values.tolist() == [32, 33, 34]
     assert part.time_s.tolist() == [23.0, 23.5, 24.0] == whole.time_s[32:35].tolist()
@@ -53,7 +55,14 @@ def test_parts_keep_the_clock():
 
 
 @pytest.mark.parametrize(
-    "about", [{"start": "1500-01-01"}, {"start": "2261-12-31", "interval_s": 1e6}, {"offset_s": 1e12}, {"start": "-1"}, {"start": "soon"}]
+    "about",
+    [
+        {"start": "1500-01-01"},
+        {"start": "2261-12-31", "interval_s": 1e6},
+        {"offset_s": 1e12},
+        {"start": "-1"},
+        {"start": "soon"},
+    ],
 )
 def test_times_beyond_the_range_of_nanoseconds_are_refused(refused, about):
     with refused("time"):

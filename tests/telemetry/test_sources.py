@@ -45,9 +45,14 @@ def test_columns_by_name_and_all_of_numbers(tmp_path):
         cleaned = check(channels["volts"])
         check(channels["amps"], "amps", 2 * VALUES)
         kinds = [finding.kind for finding in cleaned.report.findings]
-        assert kinds == ["clock", "columns left out"] and "mode" in cleaned.report.find("columns left out").text
+        assert (
+            kinds == ["clock", "columns left out"]
+            and "mode" in cleaned.report.find("columns left out").text
+        )
         named = read_source(str(tmp_path / file), columns=["amps"], time="utc")
-        assert list(named) == ["amps"] and [finding.kind for finding in clean(named["amps"]).report.findings] == ["clock"]
+        assert list(named) == ["amps"] and [
+            finding.kind for finding in clean(named["amps"]).report.findings
+        ] == ["clock"]
         counted = read_source(tmp_path / file, columns="amps", time="none")["amps"]
         assert isinstance(counted.index, pd.RangeIndex) and clean(counted).parts[0].start is None
 
@@ -59,7 +64,9 @@ def test_channels_without_time(tmp_path):
     np.save(tmp_path / "column.npy", VALUES[:, None])
     assert list(read_source(tmp_path / "wheel.npy")) == ["wheel.0", "wheel.1"]
     (channel,) = read_source(tmp_path / "wheel.npy", columns=[1]).values()
-    assert (channel.name, channel.tolist()) == ("wheel.1", (3 * VALUES).tolist()) and isinstance(channel.index, pd.RangeIndex)
+    assert (channel.name, channel.tolist()) == ("wheel.1", (3 * VALUES).tolist()) and isinstance(
+        channel.index, pd.RangeIndex
+    )
     for name in ("one", "column"):
         assert read_source(tmp_path / f"{name}.npy")[name].tolist() == VALUES.tolist()
     (tmp_path / "a.csv").write_text("a,b\n1,2\n2,5\n\n4,\n")
@@ -69,12 +76,16 @@ def test_channels_without_time(tmp_path):
 
 
 def test_commands_are_beside_the_channel_that_they_may_explain(tmp_path):
-    sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(float)  # one command after the other
+    sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(
+        float
+    )  # one command after the other
     np.save(tmp_path / "a.npy", np.column_stack([VALUES, sent]))
     for columns in (None, ["0"]):
         found = read_source(tmp_path / "a.npy", columns)
         assert list(found) == ["a.0"] and found.commands.tolist() == sent.tolist()
-    assert read_source(tmp_path / "a.npy", ["3"]).commands is None, "it would be explained by itself"
+    assert read_source(tmp_path / "a.npy", ["3"]).commands is None, (
+        "it would be explained by itself"
+    )
     np.save(tmp_path / "b.npy", np.column_stack([VALUES, 2 * sent]))
     assert len(found := read_source(tmp_path / "b.npy")) == 25 and found.commands is None
 
@@ -82,12 +93,20 @@ def test_commands_are_beside_the_channel_that_they_may_explain(tmp_path):
 def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
     """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a killed recorder."""
     rows = ["{}:00,1", ",2", "{}:01,3", "boot,4", "{}:01,3", "{}:02,5", "{}:03"]
-    (tmp_path / "a.csv").write_text("\n".join(["time,volts", *rows]).replace("{}", "2020-03-01T00:00"))
+    (tmp_path / "a.csv").write_text(
+        "\n".join(["time,volts", *rows]).replace("{}", "2020-03-01T00:00")
+    )
     channel = read_source(tmp_path / "a.csv", options=Cleaning(drop_bad=True))["volts"]
     report = clean(channel).report
     assert (report.rows_in, report.rows_used, report.rows_left_out, report.samples) == (7, 3, 4, 3)
     found = {finding.kind: finding.count for finding in report.findings}
-    assert found == {"clock": 1, "bad times": 1, "missing times": 2, "duplicate rows": 1, "missing values": 1}
+    assert found == {
+        "clock": 1,
+        "bad times": 1,
+        "missing times": 2,
+        "duplicate rows": 1,
+        "missing values": 1,
+    }
 
 
 BAD = {
@@ -100,14 +119,34 @@ BAD = {
     "bytes": ("a.csv", bytes(range(256)) * 20, {}, "not text"),
     "no header": ("a.csv", b"1,2\n3,4\n5,6\n", {}, "1, 2"),
     "lines longer than the header": ("a.csv", b"a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
-    "one name for two columns, named": ("a.csv", b"a,a,b\n1,2,3\n3,4,5\n", {"columns": ["a"]}, "'a' more than once"),
+    "one name for two columns, named": (
+        "a.csv",
+        b"a,a,b\n1,2,3\n3,4,5\n",
+        {"columns": ["a"]},
+        "'a' more than once",
+    ),
     "no such column": ("a.csv", b"a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
-    "two time columns": ("a.csv", b"start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n", {}, "start, end"),
+    "two time columns": (
+        "a.csv",
+        b"start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n",
+        {},
+        "start, end",
+    ),
     "words only": ("a.csv", b"a,b\nx,y\nz,w\n", {}, "none in a.csv"),
     "no columns named": ("a.csv", b"a,b\n1,2\n", {"columns": []}, "columns=[]"),
     "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
-    "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "left out: window ([1. 2.])"),
-    "two levels of names": ("a.parquet", pd.DataFrame([[1.0]], columns=pd.MultiIndex.from_tuples([("a", "x")])), {}, "2 levels"),
+    "windows": (
+        "a.parquet",
+        pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}),
+        {},
+        "left out: window ([1. 2.])",
+    ),
+    "two levels of names": (
+        "a.parquet",
+        pd.DataFrame([[1.0]], columns=pd.MultiIndex.from_tuples([("a", "x")])),
+        {},
+        "2 levels",
+    ),
     "no array": ("a.npy", b"not an array", {}, "a.npy"),
     "a column number too large": ("a.npy", np.zeros((3, 2)), {"columns": ["2"]}, "'2'"),
     "a time of an array": ("a.npy", np.zeros(3), {"time": "t"}, "'t'"),
@@ -144,8 +183,13 @@ def test_influxdb_refuses_columns_and_an_incomplete_location(monkeypatch, refuse
 def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
     times = (np.arange(400) * interval_s).round(3 if interval_s > 0.1 else 4)
     pd.DataFrame({"v": np.arange(400) % 7, "t": times}).to_csv(tmp_path / "a.csv", index=False)
-    (part,) = clean(read_source(tmp_path / "a.csv", ["v"], "t", Cleaning(time_format="s"))["v"]).parts
-    assert np.abs(part.time_s - times).max() < 0.05 * interval_s and part.values.tolist() == (np.arange(400) % 7).tolist()
+    (part,) = clean(
+        read_source(tmp_path / "a.csv", ["v"], "t", Cleaning(time_format="s"))["v"]
+    ).parts
+    assert (
+        np.abs(part.time_s - times).max() < 0.05 * interval_s
+        and part.values.tolist() == (np.arange(400) % 7).tolist()
+    )
     assert (part.start[:19], part.time_unit) == ("1970-01-01T00:00:00", "s")
 
 

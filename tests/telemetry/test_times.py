@@ -4,7 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.telemetry.cleaning.times import date_forms, parse_times, refuse_steps_back, refuse_two_meanings
+from enhsim_tf.telemetry.cleaning.times import (
+    date_forms,
+    parse_times,
+    refuse_steps_back,
+    refuse_two_meanings,
+)
 
 DAY = 45_000.0  # of a spreadsheet: 2023-03-15
 
@@ -37,7 +42,12 @@ def test_whole_numbers_with_a_fraction_column_are_read_by_their_format():
 
 
 @pytest.mark.parametrize(
-    ("text", "form"), [("2024-061", "%Y-%j"), ("1/13/2024 1:05 PM", "%m-%d-%Y %I:%M %p"), ("13.1.2024 1:05:07.5", "%d-%m-%Y %H:%M:%S.%f")]
+    ("text", "form"),
+    [
+        ("2024-061", "%Y-%j"),
+        ("1/13/2024 1:05 PM", "%m-%d-%Y %I:%M %p"),
+        ("13.1.2024 1:05:07.5", "%d-%m-%Y %H:%M:%S.%f"),
+    ],
 )
 def test_the_form_of_dates(text, form):
     mark = next(each for each in text if not each.isdigit())
@@ -53,9 +63,13 @@ class Log:
 
 @pytest.mark.parametrize("minutes", [[0, 20, 40, 60, 20, 40, 60], [0, 20, 20, 40, 60, 20, 40, 60]])
 def test_times_that_step_back_by_an_hour_are_refused(refused, minutes):
-    minutes = np.array(minutes) - np.where(np.arange(len(minutes)) > len(minutes) - 4, 20, 0)  # the clock goes from 60 to 0
+    minutes = np.array(minutes) - np.where(
+        np.arange(len(minutes)) > len(minutes) - 4, 20, 0
+    )  # the clock goes from 60 to 0
     with refused(f"row {len(minutes) - 3} of volts", "--timezone"):
-        refuse_steps_back(60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts", has_zone=False)
+        refuse_steps_back(
+            60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts", has_zone=False
+        )
 
 
 @pytest.mark.parametrize("minutes", [[1_400, 1_420, 0, 20], [120, 140, 80, 100]])

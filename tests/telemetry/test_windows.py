@@ -8,14 +8,25 @@ from enhsim_tf.telemetry.windows import evenly_spaced_starts, random_window_star
 
 def test_blocks_of_time_by_hand():
     starts = np.array([30, 0, 10, 20, 40, 50])  # windows of 10 that share no sample, not in order
-    blocks = [(training.tolist(), held_out.tolist()) for training, held_out in time_blocks(starts, 3, 10)]
+    blocks = [
+        (training.tolist(), held_out.tolist()) for training, held_out in time_blocks(starts, 3, 10)
+    ]
     assert blocks == [([3, 0, 4, 5], [1, 2]), ([1, 2, 4, 5], [3, 0]), ([1, 2, 3, 0], [4, 5])]
 
 
 def test_windows_that_overlap_the_held_out_block_are_left_out():
-    starts = np.arange(0, 60, 5)  # windows of 10: neighbours share 5 samples; blocks begin at 0, 20 and 40
+    starts = np.arange(
+        0, 60, 5
+    )  # windows of 10: neighbours share 5 samples; blocks begin at 0, 20 and 40
     training, held_out = time_blocks(starts, 3, 10)[1]
-    assert starts[held_out].tolist() == [20, 25, 30, 35] and starts[training].tolist() == [0, 5, 10, 45, 50, 55]
+    assert starts[held_out].tolist() == [20, 25, 30, 35] and starts[training].tolist() == [
+        0,
+        5,
+        10,
+        45,
+        50,
+        55,
+    ]
     training, held_out = time_blocks(starts, 3, 18)[1]
     assert starts[training].tolist() == [0, 55], "a quarter of eight remains"
     training, _ = time_blocks(starts, 3, 21)[1]
@@ -24,7 +35,11 @@ def test_windows_that_overlap_the_held_out_block_are_left_out():
 
 def test_there_are_at_most_as_many_blocks_as_windows():
     assert time_blocks(np.array([5]), 5, 10) == []
-    assert [held_out.tolist() for _, held_out in time_blocks(np.array([5, 0, 99]), 5, 1)] == [[1], [0], [2]]
+    assert [held_out.tolist() for _, held_out in time_blocks(np.array([5, 0, 99]), 5, 1)] == [
+        [1],
+        [0],
+        [2],
+    ]
 
 
 def test_random_starts_reach_every_window_and_no_more(refused):
@@ -42,5 +57,8 @@ def test_random_starts_reach_every_window_and_no_more(refused):
 def test_evenly_spaced_starts_reach_from_end_to_end():
     assert evenly_spaced_starts([range(110)], 10, 5).tolist() == [0, 25, 50, 75, 100]
     starts = evenly_spaced_starts([range(1_000)], 60, 37)
-    assert (starts[0], starts[-1]) == (0, 940) and set(np.diff(starts)) == {26, 27}  # 940 / 36 = 26.1
+    assert (starts[0], starts[-1]) == (0, 940) and set(np.diff(starts)) == {
+        26,
+        27,
+    }  # 940 / 36 = 26.1
     assert evenly_spaced_starts([range(60)], 60, 3).tolist() == [0]

@@ -12,10 +12,15 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.local import run_local
 from enhsim_tf.common.parallel.ray import run_ray
 
-ENGINES = {"local": (run_local, 512), "ray": (run_ray, 10_000)}  # with the maximum number of workers
+ENGINES = {
+    "local": (run_local, 512),
+    "ray": (run_ray, 10_000),
+}  # with the maximum number of workers
 
 
-def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: int | None = None) -> Iterator[Any]:
+def run(
+    engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: int | None = None
+) -> Iterator[Any]:
     """Calls `work` for each item and yields the results in the order in which they are finished.
 
     Args:
@@ -37,5 +42,7 @@ def parse_workers(text: str | None, engine: str | None = None) -> int | None:
         return None
     _, most = ENGINES[engine or "local"]
     if not (text.isdecimal() and 1 <= int(text) <= most):
-        raise InputError(f"Expected --workers auto, or a number from 1 to {most:,}. Received: {text!r}.")
+        raise InputError(
+            f"Expected --workers auto, or a number from 1 to {most:,}. Received: {text!r}."
+        )
     return int(text)

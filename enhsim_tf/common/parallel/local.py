@@ -40,23 +40,34 @@ def run_local(work: bytes, items: Iterator[Any], workers: int | None) -> Iterato
     """Implements `engines.run` with processes of this machine; `work` is pickled."""
     num_processes, retry, failures = workers or num_cpus(), collections.deque(), 0
     while failures <= MAX_FAILURES:
-        with _pool(num_processes) as pool:  # it starts a process when an item is submitted and none is idle
+        with _pool(
+            num_processes
+        ) as pool:  # it starts a process when an item is submitted and none is idle
             running: dict[concurrent.futures.Future, Any] = {}
             try:
                 while True:
-                    while len(running) < 2 * num_processes and (item := retry.popleft() if retry else next(items, None)) is not None:
+                    while (
+                        len(running) < 2 * num_processes
+                        and (item := retry.popleft() if retry else next(items, None)) is not None
+                    ):
                         running[_submit(pool, work, item, retry)] = item
                     if not running:
                         return
-                    for done in concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED).done:
+                    for done in concurrent.futures.wait(
+                        running, return_when=concurrent.futures.FIRST_COMPLETED
+                    ).done:
                         result = done.result()
                         del running[done]
                         failures = 0
                         yield result
             except BrokenProcessPool:
-                retry.extendleft(reversed(running.values()))  # before what was not submitted yet, as the pool had taken it
+                retry.extendleft(
+                    reversed(running.values())
+                )  # before what was not submitted yet, as the pool had taken it
         failures += 1
-    raise ProcessesDiedError(itertools.islice(retry, num_processes))  # the others were still waiting
+    raise ProcessesDiedError(
+        itertools.islice(retry, num_processes)
+    )  # the others were still waiting
 
 
 def num_cpus() -> int:
@@ -64,7 +75,9 @@ def num_cpus() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _submit(pool: concurrent.futures.ProcessPoolExecutor, work: bytes, item: Any, retry: collections.deque) -> concurrent.futures.Future:
+def _submit(
+    pool: concurrent.futures.ProcessPoolExecutor, work: bytes, item: Any, retry: collections.deque
+) -> concurrent.futures.Future:
     """Submits an item to the pool. A process started by this call ignores SIGINT, which the parent process handles."""
     masked = hasattr(signal, "pthread_sigmask")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masked else None
@@ -82,7 +95,9 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, work: bytes, item: Any
 def _pool(workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
     """A pool of spawned processes that is terminated at once if the block raises. Forking is not used, since TensorFlow hangs."""
     others = set(multiprocessing.active_children())
-    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _watch_parent)
+    pool = concurrent.futures.ProcessPoolExecutor(
+        workers, multiprocessing.get_context("spawn"), _watch_parent
+    )
     is_done = False
     try:
         yield pool
@@ -99,7 +114,13 @@ def _start_worker(work: bytes) -> Callable[[Any], Any]:
 
     The thread counts are set before `work` is unpickled, because unpickling imports the libraries that read them.
     """
-    numbers = "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
+    numbers = (
+        "TF_NUM_INTRAOP_THREADS",
+        "TF_NUM_INTEROP_THREADS",
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+    )
     os.environ |= dict.fromkeys(numbers, "1") | {"CUDA_VISIBLE_DEVICES": ""}
     function = pickle.loads(work)
     import threadpoolctl

@@ -25,8 +25,13 @@ def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[
     with _cluster() as ray:
         cpus = max(1, int(ray.cluster_resources().get("CPU", 1)))
         number, running, item = workers or cpus, {}, first
-        task = ray.remote(call).options(num_cpus=min(1, cpus / number), max_retries=MAX_FAILURES, scheduling_strategy="SPREAD")
-        lost = tuple(getattr(ray.exceptions, f"{name}Error") for name in ("WorkerCrashed", "ObjectLost", "NodeDied", "OutOfMemory"))
+        task = ray.remote(call).options(
+            num_cpus=min(1, cpus / number), max_retries=MAX_FAILURES, scheduling_strategy="SPREAD"
+        )
+        lost = tuple(
+            getattr(ray.exceptions, f"{name}Error")
+            for name in ("WorkerCrashed", "ObjectLost", "NodeDied", "OutOfMemory")
+        )
         try:
             while True:
                 while item is not None and len(running) < 2 * number:
@@ -52,7 +57,10 @@ def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[
 def _cluster() -> Iterator[Any]:
     """Yields the connected `ray` module. A connection that existed before is used and left open."""
     # disable usage reports and the warning about accelerators, which are not used here
-    os.environ |= {name: os.environ.get(name, "0") for name in ("RAY_USAGE_STATS_ENABLED", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO")}
+    os.environ |= {
+        name: os.environ.get(name, "0")
+        for name in ("RAY_USAGE_STATS_ENABLED", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO")
+    }
     try:
         import ray
     except ModuleNotFoundError:
@@ -64,16 +72,24 @@ def _cluster() -> Iterator[Any]:
         return
     logging.getLogger("ray").setLevel(logging.ERROR)
     address = os.environ.get("RAY_ADDRESS")
-    local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}  # only small objects are exchanged
+    local = (
+        {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}
+    )  # only small objects are exchanged
     _check_address(address)
     try:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # Ray warns of a server that does not answer before it raises
-                ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
+                warnings.simplefilter(
+                    "ignore", UserWarning
+                )  # Ray warns of a server that does not answer before it raises
+                ray.init(
+                    address or "local", logging_level=logging.ERROR, log_to_driver=False, **local
+                )
         except Exception as error:  # noqa: BLE001  Ray raises plain exceptions, as for a node that does not start in time
             where = f"at {address}" if address else "that starts here"
-            raise InputError(f"Expected a Ray cluster {where}. Received: {_last_line(error)}.") from None
+            raise InputError(
+                f"Expected a Ray cluster {where}. Received: {_last_line(error)}."
+            ) from None
         yield ray
     finally:
         ray.shutdown()  # also after a failed start, since Ray would keep trying to reach the server
@@ -82,12 +98,16 @@ def _cluster() -> Iterator[Any]:
 def _check_address(address: str | None) -> None:
     """Raises an `InputError` at once if nothing answers at the address. Ray itself would retry for minutes."""
     host, _, port = (address or "").rpartition(":")
-    if not host or not port.isdecimal() or "/" in host:  # no address, or a form that only Ray can parse
+    if (
+        not host or not port.isdecimal() or "/" in host
+    ):  # no address, or a form that only Ray can parse
         return
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_ANSWER_S).close()
     except (OSError, OverflowError) as error:
-        raise InputError(f"Expected a Ray cluster at {address} (RAY_ADDRESS). Received: {_last_line(error)}.") from None
+        raise InputError(
+            f"Expected a Ray cluster at {address} (RAY_ADDRESS). Received: {_last_line(error)}."
+        ) from None
 
 
 def _last_line(error: Exception) -> str:

@@ -59,30 +59,57 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     name = "telemetry" if not is_series or series.name is None else str(series.name)
     about = series.attrs if is_series else {}
     places, decimal = about.get("places", ROWS), options.decimal or about.get("decimal")
-    values, bad, noted = parse_numbers(series, name, options.drop_bad, decimal, options.missing_values, places)
+    values, bad, noted = parse_numbers(
+        series, name, options.drop_bad, decimal, options.missing_values, places
+    )
     if not len(values):
-        raise InputError(f"Expected samples. Received: none from {name}. Give a source that holds a series.")
+        raise InputError(
+            f"Expected samples. Received: none from {name}. Give a source that holds a series."
+        )
     has_time = is_series and not isinstance(series.index, pd.RangeIndex)
     if has_time:
         log, rows = _rows_with_times(series.index, values, name, options, about)
     elif options.interval_s is not None:
-        raise InputError(f"Expected times with interval_s (--interval). Received: {name} without any. Give a time column, or leave it out.")
+        raise InputError(
+            f"Expected times with interval_s (--interval). Received: {name} without any. Give a time column, or leave it out."
+        )
     else:
         log = CleaningLog(None, about.get("findings", ()), places)
-        log.findings.insert(0, Finding("clock", 1, "no clock: samples are counted", details={"column": None}))
+        log.findings.insert(
+            0, Finding("clock", 1, "no clock: samples are counted", details={"column": None})
+        )
         numbers = np.arange(len(values))
-        begin = series.index.start if is_series and series.index.step == 1 else 0  # a slice of a longer series keeps its sample numbers
-        rows = pd.DataFrame({"time": (numbers + begin) * UNITS_NS["s"], "value": values, "row": numbers})
+        begin = (
+            series.index.start if is_series and series.index.step == 1 else 0
+        )  # a slice of a longer series keeps its sample numbers
+        rows = pd.DataFrame(
+            {"time": (numbers + begin) * UNITS_NS["s"], "value": values, "row": numbers}
+        )
     log.findings += noted
 
     base = int(rows["time"].iloc[0])
-    parts, used, interval = regularise(rows.assign(time=rows["time"] - base), bad, log, name, options)
+    parts, used, interval = regularise(
+        rows.assign(time=rows["time"] - base), bad, log, name, options
+    )
     describe_values(parts, values[np.isfinite(values)], log)
 
     first = parts[0].begin if has_time else -base
     start = iso_time(base + round(first)) if has_time else None
-    telemetry = [Telemetry(part.values.astype(np.float32), interval / 1e9, (part.begin - first) / 1e9, start, name) for part in parts]
-    report = Report(name, len(values), used, sum(map(len, telemetry)), len(telemetry), interval / 1e9, tuple(log.findings))
+    telemetry = [
+        Telemetry(
+            part.values.astype(np.float32), interval / 1e9, (part.begin - first) / 1e9, start, name
+        )
+        for part in parts
+    ]
+    report = Report(
+        name,
+        len(values),
+        used,
+        sum(map(len, telemetry)),
+        len(telemetry),
+        interval / 1e9,
+        tuple(log.findings),
+    )
     return Cleaned(telemetry, report)
 
 
@@ -91,9 +118,20 @@ def _rows_with_times(
 ) -> tuple[CleaningLog, pd.DataFrame]:
     """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
     places = about.get("places", ROWS)
-    parsed = parse_times(index, f"the times of {name}", options.drop_bad, options.time_format, places)
-    stamps, bad, column = parsed.stamps, parsed.bad, "the index" if index.name is None else repr(str(index.name))
-    clock = about.get("clock") or {"column": column, "form": parsed.form, "zone": parsed.zone, "counts": parsed.counts}
+    parsed = parse_times(
+        index, f"the times of {name}", options.drop_bad, options.time_format, places
+    )
+    stamps, bad, column = (
+        parsed.stamps,
+        parsed.bad,
+        "the index" if index.name is None else repr(str(index.name)),
+    )
+    clock = about.get("clock") or {
+        "column": column,
+        "form": parsed.form,
+        "zone": parsed.zone,
+        "counts": parsed.counts,
+    }
     had_time = stamps.notna()
     local = stamps.tz is None
     if local and options.timezone:
@@ -103,12 +141,18 @@ def _rows_with_times(
     for kind, mask, text in (
         ("bad times", bad, "rows whose time cannot be read"),
         ("missing times", ~had_time & ~bad, "rows without a time"),
-        ("clock change", had_time & stamps.isna(), f"rows at ambiguous or nonexistent local times of {options.timezone}"),
+        (
+            "clock change",
+            had_time & stamps.isna(),
+            f"rows at ambiguous or nonexistent local times of {options.timezone}",
+        ),
     ):
         log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}", rows_left_out=int(mask.sum()))
     kept = np.flatnonzero(stamps.notna())
     if not len(kept):
-        raise InputError(f"Expected rows with times. Received: none in {name}. Name another time column.")
+        raise InputError(
+            f"Expected rows with times. Received: none in {name}. Name another time column."
+        )
     if clock["counts"] or local:
         refuse_steps_back(times[kept], kept, log, name, options.timezone is not None)
     if local:
@@ -119,7 +163,13 @@ def _rows_with_times(
     log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     kept = kept[np.argsort(times[kept], kind="stable")]
     first, last = int(times[kept[0]]), int(times[kept[-1]])
-    span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s" if clock["counts"] else f"from {iso_time(first)} to {iso_time(last)}"
+    span = (
+        f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s"
+        if clock["counts"]
+        else f"from {iso_time(first)} to {iso_time(last)}"
+    )
     text = f"the clock is {clock['column']}: {clock['form']}, zone {clock['zone']}, {span}"
-    log.findings.insert(0, Finding("clock", 1, text, details=clock | {"first_ns": first, "last_ns": last}))
+    log.findings.insert(
+        0, Finding("clock", 1, text, details=clock | {"first_ns": first, "last_ns": last})
+    )
     return log, pd.DataFrame({"time": times[kept], "value": values[kept], "row": kept})

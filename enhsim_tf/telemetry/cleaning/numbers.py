@@ -56,8 +56,14 @@ def parse_numbers(
     values = as_column(values, what)
     is_plain = pd.api.types.is_numeric_dtype(values.dtype) and values.dtype.kind not in "bc"
     if not (is_plain or is_text(values)):
-        raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column.")
-    cells = pd.Series(values.to_numpy(np.float64, na_value=np.nan)) if is_plain else values.astype(object)
+        raise InputError(
+            f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column."
+        )
+    cells = (
+        pd.Series(values.to_numpy(np.float64, na_value=np.nan))
+        if is_plain
+        else values.astype(object)
+    )
     cells, findings = _without(cells, missing_values)
     if is_plain:
         parsed, bad = cells.to_numpy(), np.zeros(len(cells), bool)
@@ -78,13 +84,21 @@ def parse_numbers(
 def as_column(values: Any, what: str) -> pd.Series:
     """Converts values to a Series with rows counted from 0; raises an `InputError` if they are not one-dimensional."""
     if isinstance(values, pd.DataFrame) or np.ndim(values) != 1:
-        raise InputError(f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from {what}. Name one column.")
+        raise InputError(
+            f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from {what}. Name one column."
+        )
     try:
         cells = pd.Series(values).reset_index(drop=True)
         return cells.astype(object) if isinstance(cells.dtype, pd.CategoricalDtype) else cells
-    except (ValueError, TypeError, NotImplementedError) as error:  # types that pandas does not support
+    except (
+        ValueError,
+        TypeError,
+        NotImplementedError,
+    ) as error:  # types that pandas does not support
         reason = (str(error).splitlines() or [""])[0]
-        raise InputError(f"Expected one plain column. Received: {type(values).__name__} from {what} ({reason}). Name one column.") from None
+        raise InputError(
+            f"Expected one plain column. Received: {type(values).__name__} from {what} ({reason}). Name one column."
+        ) from None
 
 
 def is_text(values: pd.Series) -> bool:
@@ -105,14 +119,22 @@ def is_missing(cells: pd.Series) -> np.ndarray:
     if cells.dtype == object:
         of_text &= cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
     text = cells if of_text.all() else cells[of_text]
-    if pd.api.types.is_string_dtype(text.dtype) and text.dtype != object and (text.str.len() > len("-nan(snan)") + 2).all():
+    if (
+        pd.api.types.is_string_dtype(text.dtype)
+        and text.dtype != object
+        and (text.str.len() > len("-nan(snan)") + 2).all()
+    ):
         return missing  # no such word is that long, as dates are
     text = text.str.strip().str.casefold()
-    missing[of_text] = text.isin(_MISSING).to_numpy(bool) | text.str.fullmatch(_C_NAN).to_numpy(bool)
+    missing[of_text] = text.isin(_MISSING).to_numpy(bool) | text.str.fullmatch(_C_NAN).to_numpy(
+        bool
+    )
     return missing
 
 
-def _without(cells: pd.Series, missing_values: Sequence[float | str]) -> tuple[pd.Series, list[Finding]]:
+def _without(
+    cells: pd.Series, missing_values: Sequence[float | str]
+) -> tuple[pd.Series, list[Finding]]:
     """Empties the cells that mean "no value", and says how many."""
     if not len(missing_values):
         return cells, []
@@ -120,10 +142,14 @@ def _without(cells: pd.Series, missing_values: Sequence[float | str]) -> tuple[p
     numbers_of = [float(word) for word in words if re.fullmatch(f"{_NUMBER}|{_INFINITE}", word)]
     found = pd.to_numeric(cells, errors="coerce").isin(numbers_of).to_numpy(bool)
     if cells.dtype == object:
-        found = found | cells.map(lambda cell: isinstance(cell, str) and cell.strip() in words).to_numpy(bool)
+        found = found | cells.map(
+            lambda cell: isinstance(cell, str) and cell.strip() in words
+        ).to_numpy(bool)
     if not found.any():
         return cells, []
-    text = f"values that mean no value ({', '.join(sorted(words))}), taken as missing: {found.sum():,}"
+    text = (
+        f"values that mean no value ({', '.join(sorted(words))}), taken as missing: {found.sum():,}"
+    )
     return cells.mask(found), [Finding("missing words", int(found.sum()), text)]
 
 
@@ -137,7 +163,11 @@ def shows_comma(text: pd.Series) -> bool:
     """Whether text without missing cells has numbers whose comma can only be a decimal sign, such as 20,5, but not 1,500."""
     cells = text.str.strip()
     commas = cells[cells.str.fullmatch(_COMMA).to_numpy(bool)]
-    return bool(len(commas)) and not commas.str.fullmatch(_COMMA_THOUSANDS).all() and not cells.str.fullmatch(_BOTH).any()
+    return (
+        bool(len(commas))
+        and not commas.str.fullmatch(_COMMA_THOUSANDS).all()
+        and not cells.str.fullmatch(_BOTH).any()
+    )
 
 
 def has_commas(text: pd.Series) -> bool:
@@ -150,7 +180,9 @@ def allows_point_thousands(text: pd.Series) -> bool:
     return bool(text.str.strip().str.fullmatch(f"{_POINT_THOUSANDS}|{_WHOLE}|{_COMMA}").all())
 
 
-def _parse_text_numbers(cells: pd.Series, decimal: str | None, units: bool) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
+def _parse_text_numbers(
+    cells: pd.Series, decimal: str | None, units: bool
+) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
     parsed, bad = np.full(len(cells), np.nan), np.zeros(len(cells), bool)
     left = ~is_missing(cells)
     of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
@@ -161,16 +193,33 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None, units: bool) -> t
     text, unit = _without_unit(text) if units else (text, "")
     text = _plain(text)
     sign = decimal or _sign_of(text)
-    forms = {",": f"{_COMMA}|{_POINT_THOUSANDS}|{_WHOLE}", ".": f"{_NUMBER}|{_COMMA_THOUSANDS}|{_BOTH}"}
-    readable = text.str.fullmatch(f"{forms.get(sign, _NUMBER)}|{_INFINITE}", case=False).to_numpy(bool)
+    forms = {
+        ",": f"{_COMMA}|{_POINT_THOUSANDS}|{_WHOLE}",
+        ".": f"{_NUMBER}|{_COMMA_THOUSANDS}|{_BOTH}",
+    }
+    readable = text.str.fullmatch(f"{forms.get(sign, _NUMBER)}|{_INFINITE}", case=False).to_numpy(
+        bool
+    )
     text = text[readable]
     count = int(text.str.contains(",", regex=False).sum()) if sign == "," else 0
-    text = text.str.replace("." if sign == "," else ",", "", regex=False).str.replace(",", ".", regex=False)
+    text = text.str.replace("." if sign == "," else ",", "", regex=False).str.replace(
+        ",", ".", regex=False
+    )
     parsed[rows[readable]] = text.astype(np.float64)
-    overflows = np.isinf(parsed[rows[readable]]) & ~text.str.contains("inf", case=False).to_numpy(bool)  # 1e999
+    overflows = np.isinf(parsed[rows[readable]]) & ~text.str.contains("inf", case=False).to_numpy(
+        bool
+    )  # 1e999
     bad[rows[~readable]], bad[rows[readable][overflows]] = True, True
-    findings = [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")] if count else []
-    findings += [Finding("units", len(text), f"numbers written with the unit {unit}: {len(text):,}")] if unit else []
+    findings = (
+        [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")]
+        if count
+        else []
+    )
+    findings += (
+        [Finding("units", len(text), f"numbers written with the unit {unit}: {len(text):,}")]
+        if unit
+        else []
+    )
     return parsed, bad, findings
 
 
@@ -180,16 +229,24 @@ def _without_unit(text: pd.Series) -> tuple[pd.Series, str]:
     if not len(found):
         return text, ""
     has_it = text.str.endswith(found.iloc[0]).to_numpy(bool)
-    if has_it.sum() <= len(text) / 2 or text[has_it].nunique() <= 10 or not text.str.contains("[., %\u00b0]").any():  # words: 10 cm or 2a
+    if (
+        has_it.sum() <= len(text) / 2
+        or text[has_it].nunique() <= 10
+        or not text.str.contains("[., %\u00b0]").any()
+    ):  # words: 10 cm or 2a
         return text, ""
     return text.str.removesuffix(found.iloc[0]).where(has_it, "?"), found.iloc[0].strip()
 
 
 def _plain(text: pd.Series) -> pd.Series:
     """Rewrites numbers of other programs: blanks behind the sign, Fortran's exponents, and thousands that are apart by apostrophes or blanks."""
-    odd = text[~text.str.fullmatch(_NUMBER).to_numpy(bool)].str.replace(r"^([+-])\s+(?=[\d.])", r"\1", regex=True)
+    odd = text[~text.str.fullmatch(_NUMBER).to_numpy(bool)].str.replace(
+        r"^([+-])\s+(?=[\d.])", r"\1", regex=True
+    )
     odd = odd.str.replace(r"(?<=[\d.])[dD](?=[+-]\d\d)", "e", regex=True)
-    odd = odd.mask(odd.str.fullmatch(_GROUPED).to_numpy(bool), odd.str.replace(r"['\u2019\s]", "", regex=True))
+    odd = odd.mask(
+        odd.str.fullmatch(_GROUPED).to_numpy(bool), odd.str.replace(r"['\u2019\s]", "", regex=True)
+    )
     return odd.reindex(text.index).fillna(text) if len(odd) else text
 
 
@@ -197,12 +254,16 @@ def _sign_of(text: pd.Series) -> str | None:
     """Returns the decimal sign that a column of text shows. None: points, and no commas that separate thousands."""
     if text.str.fullmatch(_BOTH).any():
         return "."
-    has_points = text[text.str.fullmatch(_NUMBER).to_numpy(bool)].str.contains(".", regex=False).any()
+    has_points = (
+        text[text.str.fullmatch(_NUMBER).to_numpy(bool)].str.contains(".", regex=False).any()
+    )
     return "," if shows_comma(text) and not has_points else None
 
 
 def _parse_object(cell: Any) -> tuple[float, bool]:
-    is_number = isinstance(cell, numbers.Real | decimal_module.Decimal) and not isinstance(cell, bool | np.bool_)
+    is_number = isinstance(cell, numbers.Real | decimal_module.Decimal) and not isinstance(
+        cell, bool | np.bool_
+    )
     try:
         return (float(cell), False) if is_number else (np.nan, True)
     except (OverflowError, ValueError):  # an integer beyond float64, or a signalling NaN

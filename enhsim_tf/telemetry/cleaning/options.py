@@ -11,7 +11,15 @@ _CHOICES = {
     "labelled": ("keep", "missing"),
     "decimal": (None, ".", ","),
 }
-UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+UNITS_NS = {
+    "D": 86_400 * 10**9,
+    "h": 3_600 * 10**9,
+    "min": 60 * 10**9,
+    "s": 10**9,
+    "ms": 10**6,
+    "us": 10**3,
+    "ns": 1,
+}
 DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_529.0}
 """Kinds of days and their number of 1970-01-01: spreadsheets, modified Julian dates, Julian dates, MATLAB."""
 _MAX_FILL = {"linear": 5, "hold": 1_000_000}
@@ -66,9 +74,13 @@ class Cleaning:
     def __post_init__(self):
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
-                raise InputError(f"Expected {name}, one of: {', '.join(filter(None, choices))}. Received: {name}={getattr(self, name)!r}.")
+                raise InputError(
+                    f"Expected {name}, one of: {', '.join(filter(None, choices))}. Received: {name}={getattr(self, name)!r}."
+                )
         if self.interval_s is not None and not 1e-9 <= self.interval_s <= 1e9:
-            raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
+            raise InputError(
+                f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}."
+            )
         if self.longest_gap < 0 or self.min_part < 1:
             raise InputError(f"Expected max_fill >= 0, min_part >= 1. Received: {self}.")
         form, units = self.time_format, (*UNITS_NS, *DAYS)
@@ -82,7 +94,11 @@ class Cleaning:
             if given is not None:
                 object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
         given = self.missing_values
-        object.__setattr__(self, "missing_values", (given,) if isinstance(given, str | float | int) else tuple(given))
+        object.__setattr__(
+            self,
+            "missing_values",
+            (given,) if isinstance(given, str | float | int) else tuple(given),
+        )
 
     @property
     def longest_gap(self) -> int:

@@ -19,7 +19,10 @@ _STUCK = 20  # a shorter run of one value, in samples, does not count as stuck
 def describe_values(parts: Sequence[Part], read: np.ndarray, log: CleaningLog) -> None:
     """Adds findings about the values of a channel to the cleaning log: of its parts, and as they were read, before any was filled in."""
     _log_fill_values(read, log)
-    values, numbers = np.concatenate([part.values for part in parts]), np.concatenate([part.source_row for part in parts])
+    values, numbers = (
+        np.concatenate([part.values for part in parts]),
+        np.concatenate([part.source_row for part in parts]),
+    )
     if np.ptp(values) == 0:
         log.add("constant", (), f"the channel is {values[0]:g} throughout", count=len(values))
         return
@@ -27,7 +30,9 @@ def describe_values(parts: Sequence[Part], read: np.ndarray, log: CleaningLog) -
     error, spread = float(np.abs(rounded - values).max()), float(values.std())
     if error > 1e-3 * spread:
         text = f"float32 rounds the values by up to {error:.3g}, while their standard deviation is {spread:.3g}: subtract their mean first"
-        log.add("resolution", (), text, count=int((rounded != values).sum()), details={"error": error})
+        log.add(
+            "resolution", (), text, count=int((rounded != values).sum()), details={"error": error}
+        )
     levels = Levels.find(read)
     if levels is not None and levels.count <= _MAX_LEVELS:
         text = f"quantised values, {{count}} levels in steps of {levels.step:.4g}: noise smaller than a step cannot be learnt"
@@ -44,9 +49,16 @@ def _log_fill_values(read: np.ndarray, log: CleaningLog) -> None:
         spread = distinct[high - 1] - distinct[low + 1]
         places = [
             place
-            for place, distance in ((low, distinct[low + 1] - distinct[low]), (high, distinct[high] - distinct[high - 1]))
+            for place, distance in (
+                (low, distinct[low + 1] - distinct[low]),
+                (high, distinct[high] - distinct[high - 1]),
+            )
             if counts[place] >= 2
-            and (distance > spread if _is_usual_fill(distinct[place]) else high - low >= _FEWEST_OTHERS and distance > _FAR * spread)
+            and (
+                distance > spread
+                if _is_usual_fill(distinct[place])
+                else high - low >= _FEWEST_OTHERS and distance > _FAR * spread
+            )
         ]
         if not places:
             break
@@ -56,12 +68,22 @@ def _log_fill_values(read: np.ndarray, log: CleaningLog) -> None:
         said = ", ".join(f"{distinct[place]:g} ({counts[place]:,} times)" for place in found)
         advice = " ".join(f"--missing-values={distinct[place]:g}" for place in found)
         text = f"far outside all other values, {distinct[low]:g} to {distinct[high]:g}: {said}; if this means that there is no value, give {advice}"
-        log.add("fill values", (), text, count=int(counts[found].sum()), details={"values": distinct[found].tolist()})
+        log.add(
+            "fill values",
+            (),
+            text,
+            count=int(counts[found].sum()),
+            details={"values": distinct[found].tolist()},
+        )
 
 
 def _is_usual_fill(value: float) -> bool:
     """Whether a value has the digits of those that loggers write for a missing one: 999.9, -9999, -32768, 1e20."""
-    return bool(re.fullmatch(r"-?9{2,}\.?9*|-?6999|-?3276[78]|65535|-?9\.9+e\+\d+|-?1e\+[23]\d", f"{value:.15g}"))
+    return bool(
+        re.fullmatch(
+            r"-?9{2,}\.?9*|-?6999|-?3276[78]|65535|-?9\.9+e\+\d+|-?1e\+[23]\d", f"{value:.15g}"
+        )
+    )
 
 
 def _log_stuck(values: np.ndarray, numbers: np.ndarray, log: CleaningLog) -> None:
@@ -75,7 +97,12 @@ def _log_stuck(values: np.ndarray, numbers: np.ndarray, log: CleaningLog) -> Non
 def _log_drift(values: np.ndarray, log: CleaningLog) -> None:
     if len(values) < 10 * _NUM_STRETCHES:
         return
-    low, middle, high = np.array([np.quantile(stretch, (0.05, 0.5, 0.95)) for stretch in np.array_split(values, _NUM_STRETCHES)]).T
+    low, middle, high = np.array(
+        [
+            np.quantile(stretch, (0.05, 0.5, 0.95))
+            for stretch in np.array_split(values, _NUM_STRETCHES)
+        ]
+    ).T
     spans = high - low
     usual = float(np.median(spans))
     moves, swells = np.ptp(middle) > 0.5 * usual, spans.max() > 1.5 * max(spans.min(), 1e-12)
@@ -84,4 +111,10 @@ def _log_drift(values: np.ndarray, log: CleaningLog) -> None:
             f"level or amplitude changes: over {_NUM_STRETCHES} consecutive stretches the median ranges from {middle.min():.4g} to "
             f"{middle.max():.4g}, and the 5 % to 95 % range from {spans.min():.4g} to {spans.max():.4g}"
         )
-        log.add("changing level", (), text, count=_NUM_STRETCHES, details={"low": low.tolist(), "high": high.tolist()})
+        log.add(
+            "changing level",
+            (),
+            text,
+            count=_NUM_STRETCHES,
+            details={"low": low.tolist(), "high": high.tolist()},
+        )

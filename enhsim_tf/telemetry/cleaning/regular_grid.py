@@ -13,10 +13,15 @@ from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
 from enhsim_tf.telemetry.windows import runs_of
 
-_ALIKE = (0.8, 1.25)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
+_ALIKE = (
+    0.8,
+    1.25,
+)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
 _RUN = 4  # smallest number of consecutive steps that form a stretch with another rate
 _MAX_JITTER = 0.25  # largest distance of a time from the regular grid, in intervals; the series is split where it is larger
-_LEAST_REGULAR = 0.4  # share of the steps that are whole numbers of intervals; random times reach 0.25
+_LEAST_REGULAR = (
+    0.4  # share of the steps that are whole numbers of intervals; random times reach 0.25
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,10 +30,14 @@ class Part:
 
     begin: float  # time of the first sample in nanoseconds, which need not be whole ones
     values: np.ndarray  # float64
-    source_row: np.ndarray  # row of each sample in the source; of a filled one, the last row before it
+    source_row: (
+        np.ndarray
+    )  # row of each sample in the source; of a filled one, the last row before it
 
 
-def regularise(rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> tuple[list[Part], int, float]:
+def regularise(
+    rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning
+) -> tuple[list[Part], int, float]:
     """Turns rows into regular parts.
 
     Args:
@@ -66,7 +75,11 @@ def regularise(rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str,
         if len(other) and not holds:  # a long step of telemetry that is held is no slower rate
             by_interval = True
             usual = f"one every {interval / 1e9:.6g} s, to which they are averaged or filled"
-            log.add("other rates", rows["row"].to_numpy()[other], f"rows in stretches of another rate than {usual}: {{count}}")
+            log.add(
+                "other rates",
+                rows["row"].to_numpy()[other],
+                f"rows in stretches of another rate than {usual}: {{count}}",
+            )
     rows, begins = _on_grids(rows, interval, options.longest_gap + 1, by_interval)
     how = "last" if holds else "mean" if by_interval else options.same_time
     return *_build_parts(rows, begins, interval, log, name, how, options), interval
@@ -75,7 +88,9 @@ def regularise(rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str,
 def find_interval(times: np.ndarray) -> float:
     """Finds the sampling interval, in nanoseconds, that most of at least two rows with different times have."""
     steps = np.sort(np.diff(times).astype(np.float64))
-    near = np.searchsorted(steps, _ALIKE[1] * steps, "right") - np.searchsorted(steps, _ALIKE[0] * steps, "left")
+    near = np.searchsorted(steps, _ALIKE[1] * steps, "right") - np.searchsorted(
+        steps, _ALIKE[0] * steps, "left"
+    )
     most = steps[np.argmax(near)]
     interval = float(np.median(steps[(_ALIKE[0] * most <= steps) & (steps <= _ALIKE[1] * most)]))
     return _refined(times, interval)
@@ -87,7 +102,9 @@ def _refined(times: np.ndarray, interval: float) -> float:
     numbers = np.round(steps / interval)
     near = (numbers >= 1) & (numbers <= 3)
     first, last = _longest_run(near)
-    sure = _longest_run(near & (np.abs(steps / interval - numbers) <= 0.25))  # excludes jumps of the clock
+    sure = _longest_run(
+        near & (np.abs(steps / interval - numbers) <= 0.25)
+    )  # excludes jumps of the clock
     if 2 * (sure[1] - sure[0]) >= last - first:
         first, last = sure
     places = np.concatenate([[0], np.cumsum(numbers[first:last])])
@@ -99,7 +116,9 @@ def _refined(times: np.ndarray, interval: float) -> float:
     centred = places - places.mean()
     slope = float(centred @ since / (centred @ centred))
     plain = (float(f"{slope:.{digits}e}") for digits in range(15))  # fewest digits that fit as well
-    return next((number for number in plain if abs(number - slope) * places[-1] <= 0.05 * slope), slope)
+    return next(
+        (number for number in plain if abs(number - slope) * places[-1] <= 0.05 * slope), slope
+    )
 
 
 def _longest_run(marks: np.ndarray) -> tuple[int, int]:
@@ -125,28 +144,51 @@ def _have_other_rate(times: np.ndarray, interval: float) -> np.ndarray:
     return marks
 
 
-def _drop_missing_values(rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str) -> pd.DataFrame:
+def _drop_missing_values(
+    rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str
+) -> pd.DataFrame:
     """Drops rows without a finite value."""
     has_value = np.isfinite(rows["value"])
     missing = rows["row"][~has_value].to_numpy()
     for kind, numbers, text in (
-        ("bad values", missing[bad[missing]], "values that cannot be read, taken as missing: {count}"),
-        ("missing values", missing[~bad[missing]], "rows without a value (NaN, infinite or empty), taken as gaps: {count}"),
+        (
+            "bad values",
+            missing[bad[missing]],
+            "values that cannot be read, taken as missing: {count}",
+        ),
+        (
+            "missing values",
+            missing[~bad[missing]],
+            "rows without a value (NaN, infinite or empty), taken as gaps: {count}",
+        ),
     ):
         log.add(kind, numbers, text, rows_left_out=len(numbers))
     if not has_value.any():
-        raise InputError(f"Expected values. Received: only missing ones in {name}. Choose another channel.")
+        raise InputError(
+            f"Expected values. Received: only missing ones in {name}. Choose another channel."
+        )
     return rows[has_value]
 
 
-def _drop_duplicate_times(rows: pd.DataFrame, log: CleaningLog, name: str, options: Cleaning) -> pd.DataFrame:
+def _drop_duplicate_times(
+    rows: pd.DataFrame, log: CleaningLog, name: str, options: Cleaning
+) -> pd.DataFrame:
     """Keeps one row for each time. A mean that would merge most rows must be asked for, by an interval."""
     is_copy = rows.duplicated(["time", "value"])
     copies = rows["row"][is_copy].to_numpy()
-    log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
+    log.add(
+        "duplicate rows",
+        copies,
+        "rows that repeat the time and value of another: {count}",
+        rows_left_out=len(copies),
+    )
     rows = rows[~is_copy]
     kept, left = _merge_groups(rows, ["time"], options.same_time)
-    if options.same_time == "mean" and options.interval_s is None and 2 * len(left) >= len(rows) > 2:
+    if (
+        options.same_time == "mean"
+        and options.interval_s is None
+        and 2 * len(left) >= len(rows) > 2
+    ):
         raise InputError(
             f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
             "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval)."
@@ -165,7 +207,9 @@ def _merge_groups(rows: pd.DataFrame, by: list[str], how: str) -> tuple[pd.DataF
     return kept, rows["row"][is_left].to_numpy()
 
 
-def _on_grids(rows: pd.DataFrame, interval: float, max_step: int, by_interval: bool) -> tuple[pd.DataFrame, np.ndarray]:
+def _on_grids(
+    rows: pd.DataFrame, interval: float, max_step: int, by_interval: bool
+) -> tuple[pd.DataFrame, np.ndarray]:
     """Splits a series at gaps of more than `max_step` intervals and assigns every row to a point of a regular grid.
 
     With `by_interval`, this is the nearest point of one grid that starts at the first row. Otherwise each part has a grid of its own, and
@@ -175,7 +219,11 @@ def _on_grids(rows: pd.DataFrame, interval: float, max_step: int, by_interval: b
         The rows with the number of their `part`, their `place` on its grid and their distance from that, `off`; the beginning of each part.
     """
     times = rows["time"].to_numpy()
-    steps = (times - times[0]) / interval if by_interval else np.append(0, np.cumsum(np.round(np.diff(times) / interval)))
+    steps = (
+        (times - times[0]) / interval
+        if by_interval
+        else np.append(0, np.cumsum(np.round(np.diff(times) / interval)))
+    )
     places = np.round(steps).astype(np.int64)
     begins = np.diff(places, prepend=places[0]) > max_step
     if not by_interval:
@@ -187,8 +235,14 @@ def _on_grids(rows: pd.DataFrame, interval: float, max_step: int, by_interval: b
     if by_interval:
         middle = times[0] + places[firsts] * interval - times[firsts]
     else:
-        low, middle, high = (pd.Series(off).groupby(part).agg(each).to_numpy() for each in ("min", "median", "max"))
-        middle = np.where(np.maximum(high - middle, middle - low) <= _MAX_JITTER * interval, middle, (low + high) / 2)
+        low, middle, high = (
+            pd.Series(off).groupby(part).agg(each).to_numpy() for each in ("min", "median", "max")
+        )
+        middle = np.where(
+            np.maximum(high - middle, middle - low) <= _MAX_JITTER * interval,
+            middle,
+            (low + high) / 2,
+        )
     return rows.assign(part=part, place=place, off=off - middle[part]), times[firsts] + middle
 
 
@@ -202,7 +256,13 @@ def _mark_spread(off: np.ndarray, begins: np.ndarray, spread: float) -> None:
 
 
 def _build_parts(
-    rows: pd.DataFrame, begins: np.ndarray, interval: float, log: CleaningLog, name: str, how: str, options: Cleaning
+    rows: pd.DataFrame,
+    begins: np.ndarray,
+    interval: float,
+    log: CleaningLog,
+    name: str,
+    how: str,
+    options: Cleaning,
 ) -> tuple[list[Part], int]:
     """Builds regular parts, fills their short gaps, and counts the rows that they use. Of several rows at one grid point, one is kept."""
     lengths = rows.groupby("part")["place"].max().to_numpy() + 1
@@ -222,7 +282,11 @@ def _build_parts(
     log.add("short parts", short, text, rows_left_out=len(short))
     parts, holds = [], options.fill == "hold"
     for number, inside in rows.groupby("part"):
-        places, values, samples = inside["place"].to_numpy(), inside["value"].to_numpy(), np.arange(lengths[number])
+        places, values, samples = (
+            inside["place"].to_numpy(),
+            inside["value"].to_numpy(),
+            np.arange(lengths[number]),
+        )
         previous = np.searchsorted(places, samples, "right") - 1
         filled = values[previous] if holds else np.interp(samples, places, values)
         parts.append(Part(begins[number], filled, inside["row"].to_numpy()[previous]))
@@ -242,7 +306,9 @@ def _log_breaks(rows: pd.DataFrame, interval: float, log: CleaningLog, max_fill:
     longest, what = steps.max(initial=0) * unit, "samples" if log.times is None else "s"
     text = f"gaps of more than {counted(max_fill, 'sample')}, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
     log.add("gaps", numbers[is_gap], text, details={"longest": float(longest)})
-    log.add("clock steps", numbers[~is_gap], "jumps of the clock, at which the series is split: {count}")
+    log.add(
+        "clock steps", numbers[~is_gap], "jumps of the clock, at which the series is split: {count}"
+    )
 
 
 def _log_jitter(rows: pd.DataFrame, interval: float, log: CleaningLog) -> None:

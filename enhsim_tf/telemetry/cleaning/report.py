@@ -65,7 +65,9 @@ class Finding:
     places: tuple[str, ...] = ()  # the first few where it was found
     rows_left_out: int = 0  # rows that are not represented by a sample
     samples_filled: int = 0  # samples that do not represent a row
-    details: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # further numbers, in plain JSON types
+    details: Mapping[str, Any] = dataclasses.field(
+        default_factory=dict
+    )  # further numbers, in plain JSON types
 
     @property
     def action(self) -> str:
@@ -122,7 +124,11 @@ class Report:
     def to_dict(self) -> dict[str, Any]:
         """The report in plain JSON types."""
         sums = {"rows_left_out": self.rows_left_out, "samples_filled": self.samples_filled}
-        return dataclasses.asdict(self) | sums | {"findings": [finding.to_dict() for finding in self.findings]}
+        return (
+            dataclasses.asdict(self)
+            | sums
+            | {"findings": [finding.to_dict() for finding in self.findings]}
+        )
 
 
 def lines_of(reports: Sequence[Report]) -> list[str]:
@@ -132,8 +138,13 @@ def lines_of(reports: Sequence[Report]) -> list[str]:
         for text in (report.summary, *(finding.line() for finding in report.findings)):
             owners.setdefault(text, []).append(report.channel)
     is_named = [len(reports) > 1 or text == reports[0].summary for text in owners]
-    lines = [f"{spoken(names)}: {text}" if named else text for (text, names), named in zip(owners.items(), is_named, strict=True)]
-    return [printable(line) for line in lines]  # names of channels and columns may contain control characters
+    lines = [
+        f"{spoken(names)}: {text}" if named else text
+        for (text, names), named in zip(owners.items(), is_named, strict=True)
+    ]
+    return [
+        printable(line) for line in lines
+    ]  # names of channels and columns may contain control characters
 
 
 class CleaningLog:
@@ -143,7 +154,13 @@ class CleaningLog:
     while reading; `counts` as in `times.Times`.
     """
 
-    def __init__(self, times: np.ndarray | None, findings: Sequence[Mapping[str, Any]] = (), places: Places = ROWS, counts: bool = False):
+    def __init__(
+        self,
+        times: np.ndarray | None,
+        findings: Sequence[Mapping[str, Any]] = (),
+        places: Places = ROWS,
+        counts: bool = False,
+    ):
         self.times, self.places, self.counts = times, places, counts
         self.findings = [Finding(**each) for each in findings]
 
@@ -155,7 +172,14 @@ class CleaningLog:
         time = f"{self.times[row] / 1e9:.10g} s" if self.counts else iso_time(self.times[row])
         return f"{self.places.of(row)}, {time}"
 
-    def add(self, kind: str, rows: Sequence[int] | np.ndarray, text: str, count: int | None = None, **numbers: Any) -> None:
+    def add(
+        self,
+        kind: str,
+        rows: Sequence[int] | np.ndarray,
+        text: str,
+        count: int | None = None,
+        **numbers: Any,
+    ) -> None:
         """Adds a finding made at rows of the source, unless its count, by default the number of these rows, is 0.
 
         `{count}` in the text becomes the count; `numbers` are the other fields of the `Finding`.
@@ -163,7 +187,9 @@ class CleaningLog:
         count = len(rows) if count is None else count
         if count:
             places = tuple(self.place(row) for row in rows[:_NUM_PLACES])
-            self.findings.append(Finding(kind, int(count), text.replace("{count}", f"{count:,}"), places, **numbers))
+            self.findings.append(
+                Finding(kind, int(count), text.replace("{count}", f"{count:,}"), places, **numbers)
+            )
 
 
 def iso_time(nanoseconds: int) -> str:

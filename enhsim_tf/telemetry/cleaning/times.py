@@ -14,13 +14,35 @@ import pandas as pd
 from pandas.tseries.api import guess_datetime_format
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.numbers import as_column, format_cell, is_missing, is_text, parse_numbers
+from enhsim_tf.telemetry.cleaning.numbers import (
+    as_column,
+    format_cell,
+    is_missing,
+    is_text,
+    parse_numbers,
+)
 from enhsim_tf.telemetry.cleaning.options import DAYS, UNITS_NS
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Places
 
-UNIT_NAMES = {"D": "days", "h": "hours", "min": "minutes", "s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
-_DAY_NAMES = {"excel": "days of spreadsheets", "mjd": "modified Julian dates", "jd": "Julian dates", "datenum": "MATLAB's day numbers"}
-_YEARS_S = (3.1e8, 3.4e9)  # seconds since 1970 in the years 1979 to 2077; later ones count from 1900 or 1904
+UNIT_NAMES = {
+    "D": "days",
+    "h": "hours",
+    "min": "minutes",
+    "s": "seconds",
+    "ms": "milliseconds",
+    "us": "microseconds",
+    "ns": "nanoseconds",
+}
+_DAY_NAMES = {
+    "excel": "days of spreadsheets",
+    "mjd": "modified Julian dates",
+    "jd": "Julian dates",
+    "datenum": "MATLAB's day numbers",
+}
+_YEARS_S = (
+    3.1e8,
+    3.4e9,
+)  # seconds since 1970 in the years 1979 to 2077; later ones count from 1900 or 1904
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
 DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
 """Pattern of a time span as text, such as `0.5 sec` and `1 days 00:00:01`."""
@@ -37,14 +59,18 @@ _DAY_MONTH = re.compile(rf"\d\d?(?P<mark>[./-])\d\d?(?P=mark)\d\d(?P<century>\d\
 class Times:
     """Parsed times."""
 
-    stamps: pd.DatetimeIndex  # NaT where missing, in UTC if the source says so and without a zone otherwise
+    stamps: (
+        pd.DatetimeIndex
+    )  # NaT where missing, in UTC if the source says so and without a zone otherwise
     bad: np.ndarray  # mask of the times that could not be parsed
     form: str = "dates"  # how they are written, for the report
     zone: str = ""  # that the source states, for the report; empty if it states none
     counts: bool = False  # whether they count from a zero of their own and are no dates
 
 
-def parse_times(times: Any, what: str, drop: bool = False, form: str | None = None, places: Places = ROWS) -> Times:
+def parse_times(
+    times: Any, what: str, drop: bool = False, form: str | None = None, places: Places = ROWS
+) -> Times:
     """Parses a column of times.
 
     Args:
@@ -62,12 +88,22 @@ def parse_times(times: Any, what: str, drop: bool = False, form: str | None = No
         return reader.of_dates(times)
     if pd.api.types.is_timedelta64_dtype(kind):
         return reader.of_numbers(times.dt.total_seconds(), "s")
-    if pd.api.types.is_bool_dtype(kind) or not (pd.api.types.is_numeric_dtype(kind) or is_text(times)) or kind.kind == "c":
-        raise InputError(f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another time column.")
+    if (
+        pd.api.types.is_bool_dtype(kind)
+        or not (pd.api.types.is_numeric_dtype(kind) or is_text(times))
+        or kind.kind == "c"
+    ):
+        raise InputError(
+            f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another time column."
+        )
     if not is_text(times):
         if not is_format:
             return reader.of_numbers(times, form)
-        times = times.astype("Int64").astype(str).where(times.notna()) if (times.dropna() % 1 == 0).all() else times.astype(str)
+        times = (
+            times.astype("Int64").astype(str).where(times.notna())
+            if (times.dropna() % 1 == 0).all()
+            else times.astype(str)
+        )
     return reader.of_text(times, form, is_format)
 
 
@@ -79,14 +115,23 @@ class _Reader:
     drop: bool
     places: Places
 
-    def refuse(self, cells: pd.Series, bad: np.ndarray, then: str = "Correct them or name another time column") -> None:
+    def refuse(
+        self,
+        cells: pd.Series,
+        bad: np.ndarray,
+        then: str = "Correct them or name another time column",
+    ) -> None:
         """Raises an `InputError` that names the first bad cell, unless there is none or they are dropped."""
         if self.drop or not bad.any():
             return
         row = int(np.argmax(bad))
         try:
             received = format_cell(cells.iloc[row])
-        except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
+        except (
+            NotImplementedError,
+            OverflowError,
+            ValueError,
+        ):  # the time is too far in the future or past to be converted to its zone
             received = "a time out of range"
         raise InputError(
             f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {self.places.of(row)} of {self.what} "
@@ -108,7 +153,10 @@ class _Reader:
         finite = np.isfinite(values)
         unit = unit or _infer_unit(values[finite], self.what)
         if unit in DAYS:
-            values, form = np.round((values - DAYS[unit]) * 86_400, 3), _DAY_NAMES[unit]  # a spreadsheet's eight decimals are a millisecond
+            values, form = (
+                np.round((values - DAYS[unit]) * 86_400, 3),
+                _DAY_NAMES[unit],
+            )  # a spreadsheet's eight decimals are a millisecond
             times, unit = pd.Series(values), "s"
         factor = UNITS_NS[unit]
         bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
@@ -116,11 +164,17 @@ class _Reader:
         usable = finite & ~bad
         since = np.full(len(values), pd.NaT.value, np.int64)
         if pd.api.types.is_integer_dtype(times.dtype):
-            since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # integers keep their precision
+            since[usable] = (
+                times[usable].to_numpy().astype(np.int64) * factor
+            )  # integers keep their precision
         else:
             whole = np.floor(values[usable])
-            since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
-        is_epoch = bool(usable.any()) and bool(form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9)
+            since[usable] = whole.astype(np.int64) * factor + np.round(
+                (values[usable] - whole) * factor
+            ).astype(np.int64)
+        is_epoch = bool(usable.any()) and bool(
+            form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9
+        )
         form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
         stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
         return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
@@ -129,16 +183,26 @@ class _Reader:
         missing = is_missing(cells)
         given, text = (cells[~missing], cells.where(~missing)) if missing.any() else (cells, cells)
         if cells.dtype == object:
-            is_date = given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64))  # datetime is a subclass of date
+            is_date = given.map(
+                lambda cell: isinstance(cell, datetime.date | np.datetime64)
+            )  # datetime is a subclass of date
             if len(given) and is_date.all():
                 aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
-                return self.of_dates(pd.Series(pd.to_datetime(text, utc=bool(aware), errors="coerce")))
-            text = text.map(lambda cell: str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None).astype("str")
+                return self.of_dates(
+                    pd.Series(pd.to_datetime(text, utc=bool(aware), errors="coerce"))
+                )
+            text = text.map(
+                lambda cell: (
+                    str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None
+                )
+            ).astype("str")
         if len(given) and not is_format:
             head, found, unit = given.iloc[:20], None, form
             if parse_numbers(head, self.what, drop=True, units=False)[1].mean() <= 0.5:
                 values, bad, _ = parse_numbers(cells, self.what, drop=True, units=False)
-                exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
+                exact = pd.to_numeric(
+                    cells.where(~missing), errors="coerce"
+                )  # integer nanoseconds keep their precision
                 found = exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values)
             elif head.astype(str).str.strip().str.fullmatch(DURATION).all():
                 spans = pd.to_timedelta(text, errors="coerce")
@@ -155,10 +219,19 @@ class _Reader:
             )
         return self._of_dates_as_text(cells, text, missing, forms[0] if forms else _ISO)
 
-    def _of_dates_as_text(self, cells: pd.Series, text: pd.Series, missing: np.ndarray, form: str) -> Times:
+    def _of_dates_as_text(
+        self, cells: pd.Series, text: pd.Series, missing: np.ndarray, form: str
+    ) -> Times:
         try:
             dates, zoned = _parse_dates(text, form)
-        except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
+        except (
+            ValueError,
+            TypeError,
+            KeyError,
+            IndexError,
+            OverflowError,
+            re.error,
+        ):  # an invalid format
             raise InputError(
                 f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}."
             ) from None
@@ -187,19 +260,52 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
     """
     if len(values) < 2:
         return
-    low, high, is_whole, step = values.min(), values.max(), (values % 1 == 0).all(), float(np.median(np.abs(np.diff(values))))
-    is_of_day = 1e4 <= low and high < 24e4 and low // 100 < high // 100 and max((values % 100).max(), (values // 100 % 100).max()) < 60
+    low, high, is_whole, step = (
+        values.min(),
+        values.max(),
+        (values % 1 == 0).all(),
+        float(np.median(np.abs(np.diff(values)))),
+    )
+    is_of_day = (
+        1e4 <= low
+        and high < 24e4
+        and low // 100 < high // 100
+        and max((values % 100).max(), (values // 100 % 100).max()) < 60
+    )
     is_fine = is_whole and 0 < low < 1.2e9 and step >= 1_000 and step % 60 > 0
-    kinds = {"decimal years": 1900 <= low and high < 2100, "hhmmss": is_of_day, "ms or us (time_format 'ms' or 'us')": is_fine}
-    for digits, form in ((7, "%Y%j"), (8, "%Y%m%d"), (10, "%Y%m%d%H"), (12, "%Y%m%d%H%M"), (14, "%Y%m%d%H%M%S")):
+    kinds = {
+        "decimal years": 1900 <= low and high < 2100,
+        "hhmmss": is_of_day,
+        "ms or us (time_format 'ms' or 'us')": is_fine,
+    }
+    for digits, form in (
+        (7, "%Y%j"),
+        (8, "%Y%m%d"),
+        (10, "%Y%m%d%H"),
+        (12, "%Y%m%d%H%M"),
+        (14, "%Y%m%d%H%M%S"),
+    ):
         if is_whole and 1.9 * 10 ** (digits - 1) <= low and high < 2.2 * 10 ** (digits - 1):
             text = pd.Series(values[:1_000].astype(np.int64).astype(str))
-            kinds[f"dates (time_format {form!r})"] = pd.to_datetime(text, format=form, errors="coerce").notna().all()
+            kinds[f"dates (time_format {form!r})"] = (
+                pd.to_datetime(text, format=form, errors="coerce").notna().all()
+            )
     tenths = step * 864_000
-    is_odd = abs(step * 1000 - round(step * 1000)) > 1e-6 and round(tenths) > 0 and abs(tenths - round(tenths)) < 0.01 * tenths
-    if any(first <= low and high < last for first, last in ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))):
+    is_odd = (
+        abs(step * 1000 - round(step * 1000)) > 1e-6
+        and round(tenths) > 0
+        and abs(tenths - round(tenths)) < 0.01 * tenths
+    )
+    if any(
+        first <= low and high < last
+        for first, last in ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))
+    ):
         since = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
-        dates = [f"{kind} (from {pd.Timestamp(round(s), unit='s')})" for kind, s in since.items() if _YEARS_S[0] < s < _YEARS_S[1]]
+        dates = [
+            f"{kind} (from {pd.Timestamp(round(s), unit='s')})"
+            for kind, s in since.items()
+            if _YEARS_S[0] < s < _YEARS_S[1]
+        ]
         kinds[f"days (time_format {', '.join(dates) or 'D'})"] = is_odd or is_date
     if kind := next((kind for kind, found in kinds.items() if found), None):
         raise InputError(
@@ -222,8 +328,12 @@ def _infer_unit(values: np.ndarray, what: str) -> str:
 
 def epoch_unit(size: float) -> str | None:
     """Returns the unit in which a number is a time since 1970 from the years 1979 to 2077, or None."""
-    units = ("s", "ms", "us", "ns")[: 3 if 6.3e17 < size < 6.5e17 else 4]  # not .NET's steps of 100 ns since the year 1
-    return next((unit for unit in units if _YEARS_S[0] <= size * UNITS_NS[unit] / 1e9 <= _YEARS_S[1]), None)
+    units = ("s", "ms", "us", "ns")[
+        : 3 if 6.3e17 < size < 6.5e17 else 4
+    ]  # not .NET's steps of 100 ns since the year 1
+    return next(
+        (unit for unit in units if _YEARS_S[0] <= size * UNITS_NS[unit] / 1e9 <= _YEARS_S[1]), None
+    )
 
 
 def date_forms(text: pd.Series) -> list[str]:
@@ -234,7 +344,10 @@ def date_forms(text: pd.Series) -> list[str]:
     head = _plain(text.iloc[:LOOK])
     if not len(head):
         return []
-    if not head.str.fullmatch(r"\d{1,7}").all() and pd.to_datetime(head, format=_ISO, utc=True, errors="coerce").notna().mean() > 0.5:
+    if (
+        not head.str.fullmatch(r"\d{1,7}").all()
+        and pd.to_datetime(head, format=_ISO, utc=True, errors="coerce").notna().mean() > 0.5
+    ):
         return [_ISO]
     for cell in head.iloc[:3]:  # the first cells may be damaged
         if found := _DAY_OF_YEAR.fullmatch(cell):
@@ -242,20 +355,38 @@ def date_forms(text: pd.Series) -> list[str]:
         if found := _DAY_MONTH.fullmatch(cell):
             year, mark = "Y" if found["century"] else "y", found["mark"]
             return [order.replace("-", mark) + _end(found) for order in _orders(text, mark, year)]
-        if re.search(r"[A-Za-z]{3}|^\d{4}[/.]", cell) and (form := guess_datetime_format(cell)) and "%Y" in form and "%d" in form:
+        if (
+            re.search(r"[A-Za-z]{3}|^\d{4}[/.]", cell)
+            and (form := guess_datetime_format(cell))
+            and "%Y" in form
+            and "%d" in form
+        ):
             return [form]
-        if found := re.fullmatch(rf"\d\d?(?P<mark>[/-])[A-Za-z]{{3}}(?P=mark)\d\d(?P<century>\d\d)?{_END}", cell):
-            return [f"%d-%b-%{'Y' if found['century'] else 'y'}".replace("-", found["mark"]) + _end(found)]
+        if found := re.fullmatch(
+            rf"\d\d?(?P<mark>[/-])[A-Za-z]{{3}}(?P=mark)\d\d(?P<century>\d\d)?{_END}", cell
+        ):
+            return [
+                f"%d-%b-%{'Y' if found['century'] else 'y'}".replace("-", found["mark"])
+                + _end(found)
+            ]
     return []
 
 
 def _orders(text: pd.Series, mark: str, year: str) -> list[str]:
     """Returns the orders of day, month and year that all dates allow; with points, the day comes first."""
     days = pd.Series(text.str[:12].unique(), dtype="str")  # far fewer than rows
-    largest = days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}(\d\d)").dropna().astype(int).max()
+    largest = (
+        days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}(\d\d)").dropna().astype(int).max()
+    )
     orders = [f"%d-%m-%{year}", f"%m-%d-%{year}", *(["%y-%m-%d"] if year == "y" else [])]
     most = {"%m": 12, "%d": 31}
-    orders = [order for order in orders if all(part <= most.get(kind, 99) for part, kind in zip(largest, order.split("-"), strict=True))]
+    orders = [
+        order
+        for order in orders
+        if all(
+            part <= most.get(kind, 99) for part, kind in zip(largest, order.split("-"), strict=True)
+        )
+    ]
     return orders[:1] if mark == "." else orders
 
 
@@ -266,12 +397,21 @@ def _end(found: re.Match) -> str:
     hours = "%I:%M" if found["half"] else "%H:%M"
     time = hours + (":%S" if found["seconds"] else "") + (".%f" if found["fraction"] else "")
     half = "" if not found["half"] else found["half"][:-2] + "%p"
-    return found["gap"] + time + half + ("" if not found["zone"] else found["zone"][: found["zone"].startswith(" ")] + "%z")
+    return (
+        found["gap"]
+        + time
+        + half
+        + ("" if not found["zone"] else found["zone"][: found["zone"].startswith(" ")] + "%z")
+    )
 
 
 def _plain(text: pd.Series) -> pd.Series:
     """Rewrites what no parser takes: decimal commas in seconds, and UTC in words."""
-    return text.str.strip().str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True).str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
+    return (
+        text.str.strip()
+        .str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True)
+        .str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
+    )
 
 
 def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
@@ -284,8 +424,13 @@ def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
         rest = rest.str.replace(_MIDNIGHT, "00", regex=True)
         whole = form.replace(".%f", "")
         for other in dict.fromkeys((form, whole, whole.replace("%S", "%S.%f"))):
-            found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None) + late
-            unit = np.promote_types(dates.dtype, found.dtype)  # whole seconds and fractions have different units
+            found = (
+                pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None)
+                + late
+            )
+            unit = np.promote_types(
+                dates.dtype, found.dtype
+            )  # whole seconds and fractions have different units
             dates = dates.astype(unit).fillna(found.astype(unit))
     if form != _ISO:
         return dates, np.full(len(text), "%z" in form or "%Z" in form)
@@ -302,7 +447,9 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     try:
         local = stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
     except (KeyError, ValueError, TypeError, OSError):
-        raise InputError(f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another.") from None
+        raise InputError(
+            f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another."
+        ) from None
     known = np.flatnonzero(stamps.notna())
     order = -1 if len(known) > 1 and stamps[known[0]] > stamps[known[-1]] else 1
     try:
@@ -311,7 +458,9 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
         return local
 
 
-def refuse_steps_back(times: np.ndarray, rows: np.ndarray, log: CleaningLog, name: str, has_zone: bool) -> None:
+def refuse_steps_back(
+    times: np.ndarray, rows: np.ndarray, log: CleaningLog, name: str, has_zone: bool
+) -> None:
     """Refuses times that step back where sorting would mix what happened at different times.
 
     These are times that count from zero and begin again, as after a restart, and, unless a zone is given or stated, dates that step back by about
@@ -324,7 +473,9 @@ def refuse_steps_back(times: np.ndarray, rows: np.ndarray, log: CleaningLog, nam
     if log.counts:  # a single late row is followed by as long a step forward
         late = 10 * usual
         back = np.flatnonzero(
-            (steps[:-1] < -late) & (np.abs(steps[1:]) <= late) & (times[1:-1] <= np.minimum.accumulate(times)[:-2] + late)
+            (steps[:-1] < -late)
+            & (np.abs(steps[1:]) <= late)
+            & (times[1:-1] <= np.minimum.accumulate(times)[:-2] + late)
         )
         how = "count from zero and begin again, as after a restart"
         then = "Read the parts one by one, or give time 'none' (--time none) to count the samples"
@@ -333,10 +484,14 @@ def refuse_steps_back(times: np.ndarray, rows: np.ndarray, log: CleaningLog, nam
     elif (np.abs(steps[back] + hour) <= 2 * usual).all():
         how = "state no zone and step back by one hour, as local clocks do"
         then = "Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)"
-    elif (np.abs(steps[back] + UNITS_NS["D"]) <= 2 * usual).all() and len(np.unique(times)) == len(times):
+    elif (np.abs(steps[back] + UNITS_NS["D"]) <= 2 * usual).all() and len(np.unique(times)) == len(
+        times
+    ):
         how = "state no zone and step back by one day, as where a date stays past midnight"
         then = "Correct them, or give timezone (--timezone UTC, or another) to sort them"
     else:
         return
     if len(back):
-        raise InputError(f"Expected ascending times. Received: times that {how}, at {log.place(rows[back[0] + 1])} of {name}. {then}.")
+        raise InputError(
+            f"Expected ascending times. Received: times that {how}, at {log.place(rows[back[0] + 1])} of {name}. {then}."
+        )

@@ -11,19 +11,42 @@ import pandas as pd
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, is_epoch, offset_of, unit_of, words_of
+from enhsim_tf.telemetry.reading.clock import (
+    NO_TIME,
+    Clock,
+    find_clock,
+    further_clocks,
+    is_epoch,
+    offset_of,
+    unit_of,
+    words_of,
+)
 from enhsim_tf.telemetry.reading.text_files import Table
 
-_LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
+_LABELS = set(
+    "anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split()
+)
 _FLAGS = set("quality qc qa flag flags valid validity mask".split())
-_ROWS = set("index idx row rows rownumber record recordnumber id no nr sample samples number entry scan seq counter".split())
+_ROWS = set(
+    "index idx row rows rownumber record recordnumber id no nr sample samples number entry scan seq counter".split()
+)
 _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
 _LABELLED = {"severity", "onset", "end", "mask"}
-_WRITTEN = (_LABELLED, {"value", "score", "flag"}, {"copy", "value", "out_of_range"})  # columns that give away a file of the commands
-_OWN = _LABELLED.union("scenario enhanced score score_after flag out_of_range".split())  # what these have beside the values
+_WRITTEN = (
+    _LABELLED,
+    {"value", "score", "flag"},
+    {"copy", "value", "out_of_range"},
+)  # columns that give away a file of the commands
+_OWN = _LABELLED.union(
+    "scenario enhanced score score_after flag out_of_range".split()
+)  # what these have beside the values
 _MAX_STATES = 10  # a label or flag has at most this many different values
-_OBJECTS = {"dates": datetime.date | np.datetime64, "times of day": datetime.time, "spans": datetime.timedelta}
+_OBJECTS = {
+    "dates": datetime.date | np.datetime64,
+    "times of day": datetime.time,
+    "spans": datetime.timedelta,
+}
 _TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
 
 
@@ -36,10 +59,14 @@ class Layout:
     channels: tuple[str, ...]
     labels: tuple[str, ...]  # which mark anomalous rows
     words: tuple[str, ...]  # which may tell several series apart
-    left_out: Mapping[str, Sequence[str]]  # the other columns by the kind of finding that reports them
+    left_out: Mapping[
+        str, Sequence[str]
+    ]  # the other columns by the kind of finding that reports them
 
 
-def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Layout:
+def lay_out(
+    table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str
+) -> Layout:
     """Says what each column of a table, in which no name repeats, is; raises an `InputError` if the clock cannot be told.
 
     `columns` are those that were asked for as channels, and `time` is the name of the time column or `NO_TIME`.
@@ -47,8 +74,16 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
     frame, asked = table.frame, set(columns or ())
     kinds = {name: _kind_of(frame[name]) for name in frame.columns}
     if "%" in (options.time_format or ""):
-        kinds |= {name: "dates" for name in frame.columns if name not in asked and _fits(frame[name], str(options.time_format))}
-    numbers = {name: _values(frame[name], table.decimal) for name, kind in kinds.items() if kind == "numbers"}
+        kinds |= {
+            name: "dates"
+            for name in frame.columns
+            if name not in asked and _fits(frame[name], str(options.time_format))
+        }
+    numbers = {
+        name: _values(frame[name], table.decimal)
+        for name, kind in kinds.items()
+        if kind == "numbers"
+    }
     roles = dict.fromkeys(asked, "")  # of each column; that of a channel is ""
 
     def take(role: str, names: Iterable[str]) -> None:
@@ -56,13 +91,37 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
 
     take("labels", _labels_of(frame, kinds, asked, options))
     take("series", options.series_column or ())
-    take("own columns", _OWN.intersection(frame.columns) if any(marks <= set(frame.columns) for marks in _WRITTEN) else ())
-    take("quality flags", [name for name, kind in kinds.items() if _words_of(name) & _FLAGS and _has_states(frame[name], kind)])
+    take(
+        "own columns",
+        _OWN.intersection(frame.columns)
+        if any(marks <= set(frame.columns) for marks in _WRITTEN)
+        else (),
+    )
+    take(
+        "quality flags",
+        [
+            name
+            for name, kind in kinds.items()
+            if _words_of(name) & _FLAGS and _has_states(frame[name], kind)
+        ],
+    )
     is_influx = {"result", "table", "_time"} <= set(kinds)
-    take("row numbers", [name for name in numbers if _numbers_rows(name, numbers[name]) or is_influx and name == "table"])
+    take(
+        "row numbers",
+        [
+            name
+            for name in numbers
+            if _numbers_rows(name, numbers[name]) or is_influx and name == "table"
+        ],
+    )
     if time is None:
         free = {name: kind for name, kind in kinds.items() if not roles.get(name)}
-        clock = find_clock(frame, free, {name: values for name, values in numbers.items() if name not in roles}, what)
+        clock = find_clock(
+            frame,
+            free,
+            {name: values for name, values in numbers.items() if name not in roles},
+            what,
+        )
     else:
         clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
     times = None
@@ -70,12 +129,21 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
         form = options.time_format or unit_of(clock, table.units, what)
         of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
         times = parse_times(clock.cells, of_what, options.drop_bad, form, table.places)
-        if not times.zone and (offset := offset_of(clock, frame, options.timezone, what)) is not None:
-            times = dataclasses.replace(times, stamps=(times.stamps - offset).tz_localize("UTC"), zone="stated in its name")
+        if (
+            not times.zone
+            and (offset := offset_of(clock, frame, options.timezone, what)) is not None
+        ):
+            times = dataclasses.replace(
+                times, stamps=(times.stamps - offset).tz_localize("UTC"), zone="stated in its name"
+            )
     take("clock", clock.columns)
     take("further clocks", further_clocks(clock, times, numbers, kinds))
-    counted = [name for name in numbers if name not in roles and clock.columns and _counts(numbers[name])]
-    if len(counted) < sum(not roles.get(name) for name in numbers):  # if the only column counts, it is the channel
+    counted = [
+        name for name in numbers if name not in roles and clock.columns and _counts(numbers[name])
+    ]
+    if len(counted) < sum(
+        not roles.get(name) for name in numbers
+    ):  # if the only column counts, it is the channel
         take("row numbers", counted)
     channels = [name for name in numbers if not roles.get(name)] if columns is None else columns
     words = tuple(name for name, kind in kinds.items() if kind == "words" and not roles.get(name))
@@ -116,7 +184,11 @@ def _kind_of(cells: pd.Series) -> str:
             return kind
     if not parse_numbers(given, "", drop=True, units=False)[1].all():
         return "numbers"
-    text = given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)].astype("str").str.strip()
+    text = (
+        given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)]
+        .astype("str")
+        .str.strip()
+    )
     if len(text) < len(given) / 2:
         return "objects"
     if has_commas(text):  # which are refused where they can be read in two ways
@@ -124,7 +196,13 @@ def _kind_of(cells: pd.Series) -> str:
     for kind, pattern in (("spans", DURATION), ("times of day", _TIME_OF_DAY)):
         if text.str.fullmatch(pattern).mean() > 0.5:
             return kind
-    return "dates" if date_forms(text) else "words" if parse_numbers(given, "", drop=True)[1].all() else "numbers"
+    return (
+        "dates"
+        if date_forms(text)
+        else "words"
+        if parse_numbers(given, "", drop=True)[1].all()
+        else "numbers"
+    )
 
 
 def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
@@ -145,14 +223,19 @@ def _has_states(cells: pd.Series, kind: str) -> bool:
     return kind == "words" or not any(isinstance(state, float) and state % 1 for state in states)
 
 
-def _labels_of(frame: pd.DataFrame, kinds: Mapping[str, str], asked: set[str], options: Cleaning) -> list[str]:
+def _labels_of(
+    frame: pd.DataFrame, kinds: Mapping[str, str], asked: set[str], options: Cleaning
+) -> list[str]:
     """Returns the columns that label anomalous rows: those that the options name, or those whose name and values show it."""
     if options.label_column is not None:
         return [] if options.label_column == (NO_TIME,) else list(options.label_column)
     found = [
         name
         for name, kind in kinds.items()
-        if name not in asked and _words_of(name) & _LABELS and kind in ("numbers", "words") and _has_states(frame[name], kind)
+        if name not in asked
+        and _words_of(name) & _LABELS
+        and kind in ("numbers", "words")
+        and _has_states(frame[name], kind)
     ]
     return [*found, "mask"] if _LABELLED <= {*frame.columns} - asked else found
 
@@ -161,7 +244,11 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
     """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
     is_unnamed = bool(re.fullmatch(r"column 0|Unnamed: \d+|level_0", name)) and not is_epoch(values)
     words = {word.casefold() for word in words_of(name)}
-    if not (is_unnamed or words <= _ROWS and words) or not np.isfinite(values).all() or (values % 1).any():
+    if (
+        not (is_unnamed or words <= _ROWS and words)
+        or not np.isfinite(values).all()
+        or (values % 1).any()
+    ):
         return False
     if (is_unnamed or len(values) < 2) and len(np.unique(values)) == len(values):
         return True
@@ -176,11 +263,25 @@ def _counts(values: np.ndarray) -> bool:
 def _fits(cells: pd.Series, form: str) -> bool:
     """Whether most cells are dates of a given format."""
     head = cells.dropna().iloc[:LOOK]
-    if pd.api.types.is_float_dtype(head.dtype) or not (is_text(head) or pd.api.types.is_integer_dtype(head.dtype)):
+    if pd.api.types.is_float_dtype(head.dtype) or not (
+        is_text(head) or pd.api.types.is_integer_dtype(head.dtype)
+    ):
         return False
     try:
-        return bool(pd.to_datetime(head.astype(str).str.strip(), format=form, errors="coerce", utc=True).notna().mean() > 0.5)
-    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format, which the parser of times refuses
+        return bool(
+            pd.to_datetime(head.astype(str).str.strip(), format=form, errors="coerce", utc=True)
+            .notna()
+            .mean()
+            > 0.5
+        )
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        OverflowError,
+        re.error,
+    ):  # an invalid format, which the parser of times refuses
         return False
 
 
@@ -192,7 +293,11 @@ def anomalous(cells: pd.Series) -> np.ndarray | None:
     if pd.api.types.is_bool_dtype(cells.dtype):
         return cells.to_numpy(bool)
     objects = cells.astype(object)
-    values, bad, _ = parse_numbers(objects.map(lambda cell: int(cell) if isinstance(cell, bool | np.bool_) else cell), "", drop=True)
+    values, bad, _ = parse_numbers(
+        objects.map(lambda cell: int(cell) if isinstance(cell, bool | np.bool_) else cell),
+        "",
+        drop=True,
+    )
     if not bad.any():
         states = set(values[np.isfinite(values)].tolist())
         if states == {-1.0, 1.0}:

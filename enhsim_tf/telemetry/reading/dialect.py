@@ -43,7 +43,9 @@ def decode(content: bytes) -> tuple[str, list[Finding]]:
             text = whole.decode("utf-8-sig")  # with or without a byte order mark
         except UnicodeDecodeError:
             text = whole.decode("cp1252", "replace")
-            findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Windows-1252"))
+            findings.append(
+                Finding("encoding", 1, "the text is not UTF-8 and was read as Windows-1252")
+            )
     if "\x00" in text:
         raise ValueError("it is not text")
     if "\r" in text and "\n" not in text:
@@ -61,19 +63,29 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         ValueError: If there is nothing but comments.
     """
     lines = [line.rstrip("\r") for line in text[:_HEAD].split("\n", _HEAD_LINES)[:_HEAD_LINES]]
-    if stated := re.fullmatch(r'"?sep=(.)"?', lines[0].strip(" \ufeff")):  # as spreadsheets write it
+    if stated := re.fullmatch(
+        r'"?sep=(.)"?', lines[0].strip(" \ufeff")
+    ):  # as spreadsheets write it
         lines[0], separator = "", stated[1]
     if not any(map(_is_content, lines)):
         raise ValueError("it is empty")
     layouts = [_lay_out(mark, _split(lines, mark), no_header) for mark in separator or _SEPARATORS]
     if not any(each and len(each.names) > 1 for each in layouts):
-        layouts = [_lay_out(BLANKS, [line.split() if _is_content(line) else [] for line in lines], no_header)]
+        layouts = [
+            _lay_out(
+                BLANKS, [line.split() if _is_content(line) else [] for line in lines], no_header
+            )
+        ]
     found = [each for each in layouts if each and len(each.names) > 1]
     if not found or found[0].separator == BLANKS:
-        single = _lay_out(",", [[line.strip()] if _is_content(line) else [] for line in lines], no_header)
+        single = _lay_out(
+            ",", [[line.strip()] if _is_content(line) else [] for line in lines], no_header
+        )
         found += [single] if single else []
     with_header = [each for each in found if any(each.names)]
-    best = max(with_header or found, key=lambda each: len(each.names) if with_header else 0, default=None)
+    best = max(
+        with_header or found, key=lambda each: len(each.names) if with_header else 0, default=None
+    )
     if best is None:
         raise ValueError("lines of different lengths")
     if not with_header and not no_header:
@@ -83,7 +95,9 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
                 f"Expected a header line with the columns' names. Received: {', '.join(found[0].head[0][:4]) if found[0].head else 'none'} "
                 f"in {name}. Add a line of names on top, or give no_header=True (--no-header)."
             )
-    return dataclasses.replace(best, names=[each or f"column {number}" for number, each in enumerate(best.names)])
+    return dataclasses.replace(
+        best, names=[each or f"column {number}" for number, each in enumerate(best.names)]
+    )
 
 
 def _is_content(line: str) -> bool:
@@ -94,7 +108,16 @@ def _split(lines: Sequence[str], mark: str) -> list[list[str]]:
     """Splits lines into cells; comments and blank lines have none."""
     rows = []
     for line in lines:
-        cells = next(csv.reader([line.replace("\r", " ")], delimiter=mark, skipinitialspace=mark != "\t"), []) if _is_content(line) else []
+        cells = (
+            next(
+                csv.reader(
+                    [line.replace("\r", " ")], delimiter=mark, skipinitialspace=mark != "\t"
+                ),
+                [],
+            )
+            if _is_content(line)
+            else []
+        )
         rows.append([cell.strip() for cell in cells])
     return rows
 
@@ -113,27 +136,49 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
 
     def share(row: list[str]) -> float:
         """Share of the columns of numbers and dates that hold one in this row, none if its cells are names that count, as in `,0,1`."""
-        if len(row) > 1 and row[1:] in (counts[: len(row) - 1], counts[1 : len(row)]) and not _SOLID.match(row[0]):
+        if (
+            len(row) > 1
+            and row[1:] in (counts[: len(row) - 1], counts[1 : len(row)])
+            and not _SOLID.match(row[0])
+        ):
             return 0.0
-        return sum(place < len(row) and bool(_SOLID.match(row[place])) for place in solid) / max(1, len(solid))
+        return sum(place < len(row) and bool(_SOLID.match(row[place])) for place in solid) / max(
+            1, len(solid)
+        )
 
-    begin = next((number for number, row in enumerate(rows) if len(row) == width and share(row) > 0.5), None)
+    begin = next(
+        (number for number, row in enumerate(rows) if len(row) == width and share(row) > 0.5), None
+    )
     if begin is None:  # words only
         begin = next(number for number, row in enumerate(rows) if row) + (not no_header)
     while begin > 0 and len(rows[begin - 1]) == width and share(rows[begin - 1]) > 0:
         begin -= 1
-    if begin > 0 and len(rows[begin - 1]) == width + 1 and share(rows[begin - 1]) == 0:  # of a last column that is mostly left out
+    if (
+        begin > 0 and len(rows[begin - 1]) == width + 1 and share(rows[begin - 1]) == 0
+    ):  # of a last column that is mostly left out
         width += 1
-    block = next((number for number in range(begin, 0, -1) if rows[number - 1]), 0)  # a blank line may follow the names
+    block = next(
+        (number for number in range(begin, 0, -1) if rows[number - 1]), 0
+    )  # a blank line may follow the names
     block = block if block and len(rows[block - 1]) == width else begin
     top = block
-    while block > 0 and rows[block - 1] and len(rows[block - 1]) <= width and (share(rows[block - 1]) == 0 or len(rows) == 1):
+    while (
+        block > 0
+        and rows[block - 1]
+        and len(rows[block - 1]) <= width
+        and (share(rows[block - 1]) == 0 or len(rows) == 1)
+    ):
         block -= 1
     names, units, skipped = [""] * width, [], sum(bool(row) for row in rows[:begin])
     if block < top and not no_header:
-        header = max(range(block, top), key=lambda number: (len({cell for cell in rows[number] if cell}), -number))
+        header = max(
+            range(block, top),
+            key=lambda number: (len({cell for cell in rows[number] if cell}), -number),
+        )
         given = rows[header]
-        if mark == BLANKS and 1 < len(given) == width - 1 and ":" in rows[begin][1]:  # a date and a time of day below one name
+        if (
+            mark == BLANKS and 1 < len(given) == width - 1 and ":" in rows[begin][1]
+        ):  # a date and a time of day below one name
             given = ["", *given]
         short = width - len(given)
         if short and any(row[len(given) :] != [""] * short for row in sample):
@@ -142,8 +187,12 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
         if not any(names):
             return None
         others = [rows[number] for number in range(block, top) if number != header]
-        for place in [place for place, name in enumerate(names) if not name]:  # names in two lines, as under merged cells
-            names[place] = next((row[place] for row in others if place < len(row) and row[place]), "")
+        for place in [
+            place for place, name in enumerate(names) if not name
+        ]:  # names in two lines, as under merged cells
+            names[place] = next(
+                (row[place] for row in others if place < len(row) and row[place]), ""
+            )
         units = rows[header + 1] if header + 1 < top else []
     elif block < top and no_header:
         begin, skipped = block, sum(bool(row) for row in rows[:block])
@@ -161,15 +210,25 @@ def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
 
     If that repeats a name, it holds units, as in files of weather buoys, and the comment before it the names.
     """
-    comments = [line.lstrip("#%").strip() for line in lines[: found.first_line] if line.startswith(("#", "%"))]
+    comments = [
+        line.lstrip("#%").strip()
+        for line in lines[: found.first_line]
+        if line.startswith(("#", "%"))
+    ]
     if not comments:
         return None
     mark = re.escape(found.separator)
     if found.separator == BLANKS:
         mark = BLANKS if len(comments[-1].split()) == len(found.names) else r"\s{2,}|\t"
-    *before, names = ([name.strip() for name in re.split(mark, comment)] for comment in comments[-2:])
+    *before, names = (
+        [name.strip() for name in re.split(mark, comment)] for comment in comments[-2:]
+    )
     if before and len(before[0]) == len(names) == len(set(before[0])) > len(set(names)):
         found, names = dataclasses.replace(found, units=names), before[0]
-    if len(names) != len(found.names) or not all(names[1:]) or all(_SOLID.match(name) for name in names):
+    if (
+        len(names) != len(found.names)
+        or not all(names[1:])
+        or all(_SOLID.match(name) for name in names)
+    ):
         return None
     return dataclasses.replace(found, names=names)

@@ -23,12 +23,20 @@ TEXTS = (".csv", ".tsv", ".txt")
 _EXCEL = (".xlsx", ".xlsm")
 
 
-def read_table(source: Path | Sequence[Path] | pd.DataFrame | pd.Series, options: Cleaning) -> Table:
+def read_table(
+    source: Path | Sequence[Path] | pd.DataFrame | pd.Series, options: Cleaning
+) -> Table:
     """Reads a file, a folder of files, several files with the same columns, or a pandas object; the rows of files follow each other."""
     if isinstance(source, pd.DataFrame | pd.Series):
         table = Table(source.to_frame() if isinstance(source, pd.Series) else source)
         return _with_plain_columns(table, "the DataFrame")
-    paths = source if not isinstance(source, Path) else files_of(source) if source.is_dir() else [source]
+    paths = (
+        source
+        if not isinstance(source, Path)
+        else files_of(source)
+        if source.is_dir()
+        else [source]
+    )
     tables = [_with_plain_columns(_read_file(path, options), path.name) for path in paths]
     return tables[0] if len(tables) == 1 else _join(tables, paths)
 
@@ -36,10 +44,21 @@ def read_table(source: Path | Sequence[Path] | pd.DataFrame | pd.Series, options
 def files_of(folder: Path) -> list[Path]:
     """Returns the tables in a folder, in the order of their names: CSV files, or those of the next kind if there are none."""
     for endings in ((".csv",), (".parquet",), (".tsv", ".txt"), _EXCEL):
-        found = [path for path in folder.iterdir() if path.is_file() and _suffix_of(path) in endings and not path.name.startswith(".")]
+        found = [
+            path
+            for path in folder.iterdir()
+            if path.is_file() and _suffix_of(path) in endings and not path.name.startswith(".")
+        ]
         if found:
-            return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)])
-    raise InputError(f"Expected a folder with tables. Received: {folder} without any. Give {SOURCES}.")
+            return sorted(
+                found,
+                key=lambda path: [
+                    int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)
+                ],
+            )
+    raise InputError(
+        f"Expected a folder with tables. Received: {folder} without any. Give {SOURCES}."
+    )
 
 
 def _suffix_of(path: Path) -> str:
@@ -57,7 +76,11 @@ def _read_file(path: Path, options: Cleaning) -> Table:
                 raise ValueError("a packed Parquet file; unpack it")
             return Table(pd.read_parquet(path))
         content = path.read_bytes() if content is None else content
-        return _read_excel(io.BytesIO(content), path.name, options) if suffix in _EXCEL else read_text(content, path.name, options)
+        return (
+            _read_excel(io.BytesIO(content), path.name, options)
+            if suffix in _EXCEL
+            else read_text(content, path.name, options)
+        )
     except InputError:
         raise
     except (*READ_ERRORS, pa.ArrowException) as error:
@@ -70,13 +93,22 @@ def _unpack(path: Path) -> tuple[bytes | None, str]:
     """Returns the content of a packed file, or None if it is not packed, and the name of the file inside."""
     suffix = path.suffix.lower()
     if suffix == ".gz":
-        content, name = gzip.decompress(path.read_bytes()), path.stem if Path(path.stem).suffix else f"{path.stem}.csv"
+        content, name = (
+            gzip.decompress(path.read_bytes()),
+            path.stem if Path(path.stem).suffix else f"{path.stem}.csv",
+        )
     elif suffix == ".zip":
         with zipfile.ZipFile(path) as archive:
-            members = [member for member in archive.infolist() if not member.is_dir() and not member.filename.startswith("__MACOSX/")]
+            members = [
+                member
+                for member in archive.infolist()
+                if not member.is_dir() and not member.filename.startswith("__MACOSX/")
+            ]
             if len(members) != 1:
                 said = ", ".join(member.filename for member in members[:4]) or "none"
-                raise InputError(f"Expected one file in {path.name}. Received: {len(members)} ({said}). Unpack it and give the files.")
+                raise InputError(
+                    f"Expected one file in {path.name}. Received: {len(members)} ({said}). Unpack it and give the files."
+                )
             content, name = archive.read(members[0]), members[0].filename
     else:
         return None, path.name
@@ -90,14 +122,26 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
     try:
         import openpyxl
     except ImportError:
-        raise InputError(f"Expected the package openpyxl for {name}. Received: none. Install it, or save the sheet as CSV.") from None
+        raise InputError(
+            f"Expected the package openpyxl for {name}. Received: none. Install it, or save the sheet as CSV."
+        ) from None
     findings, book = [], openpyxl.load_workbook(stream, read_only=True, data_only=True)
     rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]
     if len(book.worksheets) > 1:
-        findings.append(Finding("files", 1, f"only the first sheet was read: {book.worksheets[0].title}"))
-    width = max((place + 1 for row in rows for place, cell in enumerate(row) if cell is not None), default=0)
-    cells = [["" if cell is None else str(cell).replace("\n", " ") for cell in row[:width]] for row in rows[:100]]
-    text = "\n".join("\t".join(cell.replace("\t", " ").replace('"', "'") for cell in row) if any(row) else "" for row in cells)
+        findings.append(
+            Finding("files", 1, f"only the first sheet was read: {book.worksheets[0].title}")
+        )
+    width = max(
+        (place + 1 for row in rows for place, cell in enumerate(row) if cell is not None), default=0
+    )
+    cells = [
+        ["" if cell is None else str(cell).replace("\n", " ") for cell in row[:width]]
+        for row in rows[:100]
+    ]
+    text = "\n".join(
+        "\t".join(cell.replace("\t", " ").replace('"', "'") for cell in row) if any(row) else ""
+        for row in cells
+    )
     dialect = find_dialect(text, name, options.no_header, "\t")
     frame = pd.DataFrame([row[:width] for row in rows[dialect.first_line :]]).infer_objects()
     return table_of(frame, dialect, name, None, findings)
@@ -106,9 +150,13 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
 def _with_plain_columns(table: Table, name: str) -> Table:
     """Turns an index that means something into a column, and names into text."""
     frame = table.frame
-    frame = frame.reset_index(drop=isinstance(frame.index, pd.RangeIndex))  # the rows of a slice are counted from 0 as well
+    frame = frame.reset_index(
+        drop=isinstance(frame.index, pd.RangeIndex)
+    )  # the rows of a slice are counted from 0 as well
     if frame.columns.nlevels > 1:
-        raise InputError(f"Expected one line of column names. Received: {frame.columns.nlevels} levels in {name}. Join them.")
+        raise InputError(
+            f"Expected one line of column names. Received: {frame.columns.nlevels} levels in {name}. Join them."
+        )
     if not 0 < len(frame.columns) <= MAX_COLUMNS:
         raise InputError(
             f"Expected a table of 1 to {MAX_COLUMNS:,} columns. Received: {len(frame.columns):,} in {name}. Give another table."
@@ -128,9 +176,25 @@ def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
             )
     places, row = [], 0
     for table, path in zip(tables, paths, strict=True):
-        places += [(row + first, line, name) for first, line, name in table.places] or [(row, 1, path.name)]
+        places += [(row + first, line, name) for first, line, name in table.places] or [
+            (row, 1, path.name)
+        ]
         row += len(table.frame)
     frame = pd.concat([table.frame[names] for table in tables], ignore_index=True)
-    findings = [Finding("files", len(paths), f"files read one after the other: {len(paths)}, {paths[0].name} to {paths[-1].name}")]
-    findings += list({finding.text: finding for table in tables for finding in table.findings}.values())
-    return Table(frame, Places(places), next((each.decimal for each in tables if each.decimal), None), tuple(findings), tables[0].units)
+    findings = [
+        Finding(
+            "files",
+            len(paths),
+            f"files read one after the other: {len(paths)}, {paths[0].name} to {paths[-1].name}",
+        )
+    ]
+    findings += list(
+        {finding.text: finding for table in tables for finding in table.findings}.values()
+    )
+    return Table(
+        frame,
+        Places(places),
+        next((each.decimal for each in tables if each.decimal), None),
+        tuple(findings),
+        tables[0].units,
+    )

@@ -25,25 +25,37 @@ from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 from studies.common.training import seeded_initialiser
 
-_NUM_LAGS, _NUM_NEAR = 64, 16  # last samples that the linear prediction, and the hidden layers, see one by one
+_NUM_LAGS, _NUM_NEAR = (
+    64,
+    16,
+)  # last samples that the linear prediction, and the hidden layers, see one by one
 _SIGNAL_LAGS = np.array([-8, 0, 8])  # where it sees the enhanced signal, around the sample
 _UNITS = 48
-_DEGREES = np.array([100.0, 100.0, 100.0, 3.0, 3.0])  # of freedom of the components: three are nearly Gaussian, two have heavy tails
+_DEGREES = np.array(
+    [100.0, 100.0, 100.0, 3.0, 3.0]
+)  # of freedom of the components: three are nearly Gaussian, two have heavy tails
 _FIRST_LOGITS = np.array([0.0, 0.0, 0.0, -3.0, -3.0])
 _NUM_COMPONENTS = len(_DEGREES)
 _CLIP = 6.0  # largest magnitude, in standard deviations, of an input of the hidden layers
-_TINY = 1e-3  # added to magnitudes before their logarithm is taken, in standard deviations of the noise
+_TINY = (
+    1e-3  # added to magnitudes before their logarithm is taken, in standard deviations of the noise
+)
 _RIDGE = 1e-5  # penalty of the linear prediction, as a share of the variance of its inputs
 _LOG_SCALES = (-5.0, 3.0)  # limits of a component, relative to the error of the linear prediction
 _BATCH, _RATE, _WEIGHT_DECAY = 1_000, 3e-3, 1.0
 _CHECK_EVERY = 50  # steps between two looks at held-out noise
-_NUM_LINEAR, _NUM_JUDGED = 100_000, 30_000  # samples for the linear prediction, and on which weights are compared
+_NUM_LINEAR, _NUM_JUDGED = (
+    100_000,
+    30_000,
+)  # samples for the linear prediction, and on which weights are compared
 _HELD_OUT = 0.15  # share of the time, at its end, on which epochs are compared
 _LIMIT = 1.2  # generated samples stay within this multiple of the largest magnitude of the training windows
 _ROWS = 1_024  # windows that are drawn at a time
 
 ops = keras.ops
-_LOG_CONSTANTS = gammaln((_DEGREES + 1) / 2) - gammaln(_DEGREES / 2) - 0.5 * np.log(np.pi * _DEGREES)  # of the densities
+_LOG_CONSTANTS = (
+    gammaln((_DEGREES + 1) / 2) - gammaln(_DEGREES / 2) - 0.5 * np.log(np.pi * _DEGREES)
+)  # of the densities
 
 
 class MixtureDensityNoise:
@@ -57,7 +69,9 @@ class MixtureDensityNoise:
     def __init__(self, seed: int = 0, num_steps: int = 600):
         self.seed, self.num_steps = seed, num_steps
 
-    def fit(self, noise: np.ndarray, signal: np.ndarray | None = None, starts: np.ndarray | None = None) -> "MixtureDensityNoise":
+    def fit(
+        self, noise: np.ndarray, signal: np.ndarray | None = None, starts: np.ndarray | None = None
+    ) -> "MixtureDensityNoise":
         """Trains the network by maximum likelihood.
 
         Args:
@@ -70,22 +84,38 @@ class MixtureDensityNoise:
         """
         noise, rng = np.asarray(noise, np.float64), np.random.default_rng([self.seed, 61])
         self.window, self.scale = noise.shape[1], float(np.std(noise))
-        if not (np.isfinite(noise).all() and self.scale > 0 and len(noise) >= 2 and self.window >= 8):
-            raise InputError(f"Expected finite noise that varies, in windows of at least 8 samples. Received: shape {noise.shape}.")
+        if not (
+            np.isfinite(noise).all() and self.scale > 0 and len(noise) >= 2 and self.window >= 8
+        ):
+            raise InputError(
+                f"Expected finite noise that varies, in windows of at least 8 samples. Received: shape {noise.shape}."
+            )
         self._levels, self._past = Levels.find(noise), self.window // 2
         self._limit = _LIMIT * float(np.max(np.abs(noise))) / self.scale
         if self._levels is not None:
             noise = noise + self._levels.step * (rng.random(noise.shape) - 0.5)
-        self._signal_scale = None if signal is None else (float(np.mean(signal)), float(np.std(signal)) or 1.0)
+        self._signal_scale = (
+            None if signal is None else (float(np.mean(signal)), float(np.std(signal)) or 1.0)
+        )
         values, below = (noise / self.scale).astype(np.float32), self._standardised(signal)
         self._pasts = self._real_pasts(values, below)
-        learnt, held_out = _split(self.window * np.arange(len(noise)) if starts is None else np.asarray(starts), self.window)
+        learnt, held_out = _split(
+            self.window * np.arange(len(noise)) if starts is None else np.asarray(starts),
+            self.window,
+        )
         judged = self._examples(values, below, held_out, _NUM_JUDGED, rng)
-        self.network = _build(*self._examples(values, below, learnt, _NUM_LINEAR, rng), self._num_linear, self._num_far, self.seed)
+        self.network = _build(
+            *self._examples(values, below, learnt, _NUM_LINEAR, rng),
+            self._num_linear,
+            self._num_far,
+            self.seed,
+        )
         self._train(lambda: self._examples(values, below, learnt, _BATCH, rng), judged)
         return self
 
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+    def generate(
+        self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None
+    ) -> np.ndarray:
         """Generates windows of noise, float32 of shape `(number, samples)`, in the unit of the telemetry.
 
         Args:
@@ -104,17 +134,27 @@ class MixtureDensityNoise:
         """Continues real noise sample by sample, in standard deviations."""
         past, rows = self._past, np.arange(number)
         seen = np.empty((number, past + self.window), np.float32)
-        seen[:, :past] = self._pasts.generate(number, rng, None if below is None else below[:, :past])
+        seen[:, :past] = self._pasts.generate(
+            number, rng, None if below is None else below[:, :past]
+        )
         for place in range(self.window):
             inputs = self._inputs(seen[:, place : place + past], below, rows, place)
-            logits, means, log_scales = np.split(self.network.predict_on_batch(inputs).astype(np.float64), 3, axis=1)
+            logits, means, log_scales = np.split(
+                self.network.predict_on_batch(inputs).astype(np.float64), 3, axis=1
+            )
             shares = np.cumsum(np.exp(logits - logits.max(axis=1, keepdims=True)), axis=1)
             chosen = (rng.random((number, 1)) * shares[:, -1:] > shares).sum(axis=1)
-            drawn = means[rows, chosen] + np.exp(log_scales[rows, chosen]) * rng.standard_t(_DEGREES[chosen])
+            drawn = means[rows, chosen] + np.exp(log_scales[rows, chosen]) * rng.standard_t(
+                _DEGREES[chosen]
+            )
             seen[:, past + place] = np.clip(drawn, -self._limit, self._limit)
         return seen[:, past:]
 
-    def _train(self, draw: Callable[[], tuple[np.ndarray, np.ndarray]], judged: tuple[np.ndarray, np.ndarray]) -> None:
+    def _train(
+        self,
+        draw: Callable[[], tuple[np.ndarray, np.ndarray]],
+        judged: tuple[np.ndarray, np.ndarray],
+    ) -> None:
         """Trains the network on batches, and keeps the weights that are best on held-out noise."""
         rate = keras.optimizers.schedules.CosineDecay(_RATE, max(1, self.num_steps), 0.01)
         optimizer = keras.optimizers.AdamW(rate, weight_decay=_WEIGHT_DECAY, global_clipnorm=1.0)
@@ -133,17 +173,28 @@ class MixtureDensityNoise:
         if self._signal_scale is None:
             return None
         if signal is None:
-            raise InputError("Expected the enhanced signal, on which this noise depends. Received: none. Give the windows below the noise.")
+            raise InputError(
+                "Expected the enhanced signal, on which this noise depends. Received: none. Give the windows below the noise."
+            )
         mean, deviation = self._signal_scale
         return ((np.asarray(signal, np.float64) - mean) / deviation).astype(np.float32)
 
     def _real_pasts(self, values: np.ndarray, below: np.ndarray | None) -> WindowBootstrap:
         """Draws first halves of windows, whose signal in the second half is similar to that of a generated window in the first."""
         first = values[:, : self._past]
-        return WindowBootstrap(first) if below is None else WindowBootstrap.fit(first, below[:, self._past : 2 * self._past])
+        return (
+            WindowBootstrap(first)
+            if below is None
+            else WindowBootstrap.fit(first, below[:, self._past : 2 * self._past])
+        )
 
     def _examples(
-        self, values: np.ndarray, below: np.ndarray | None, rows: np.ndarray, number: int, rng: np.random.Generator
+        self,
+        values: np.ndarray,
+        below: np.ndarray | None,
+        rows: np.ndarray,
+        number: int,
+        rng: np.random.Generator,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Inputs of the network and the sample that follows, at random places of some windows."""
         rows, places = rng.choice(rows, number), rng.integers(self._past, self.window, number)
@@ -154,7 +205,9 @@ class MixtureDensityNoise:
             inputs.append(self._inputs(seen, below, rows[some], places[some]))
         return np.concatenate(inputs), values[rows, places, None]
 
-    def _inputs(self, seen: np.ndarray, below: np.ndarray | None, rows: np.ndarray, places: np.ndarray | int) -> np.ndarray:
+    def _inputs(
+        self, seen: np.ndarray, below: np.ndarray | None, rows: np.ndarray, places: np.ndarray | int
+    ) -> np.ndarray:
         """What the network sees before samples at places of windows, from the samples `seen` before each and the signal `below`.
 
         Returns:
@@ -179,36 +232,62 @@ def _split(starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
     return (learnt, held_out) if len(learnt) else (np.flatnonzero(starts < border), held_out)
 
 
-def _build(inputs: np.ndarray, targets: np.ndarray, num_linear: int, num_far: int, seed: int) -> keras.Model:
+def _build(
+    inputs: np.ndarray, targets: np.ndarray, num_linear: int, num_far: int, seed: int
+) -> keras.Model:
     """Builds the network, which starts as one density around the linear prediction of least squares.
 
     The linear prediction sees the first `num_linear` inputs; the hidden layers do not see the first `num_far`. The output, of shape
     `(samples, 3 * components)`, holds logits, means and logarithms of the scales.
     """
-    mean, deviation = inputs.mean(axis=0, dtype=np.float64), inputs.std(axis=0, dtype=np.float64) + 1e-6
-    known = np.column_stack([(inputs[:, :num_linear] - mean[:num_linear]) / deviation[:num_linear], np.ones(len(inputs))])
+    mean, deviation = (
+        inputs.mean(axis=0, dtype=np.float64),
+        inputs.std(axis=0, dtype=np.float64) + 1e-6,
+    )
+    known = np.column_stack(
+        [
+            (inputs[:, :num_linear] - mean[:num_linear]) / deviation[:num_linear],
+            np.ones(len(inputs)),
+        ]
+    )
     gram = known.T @ known + _RIDGE * len(known) * np.eye(num_linear + 1)
     coefficients = np.linalg.solve(gram, known.T @ targets)
     error = float(np.std(targets - known @ coefficients)) + 1e-6
 
     given = keras.Input((inputs.shape[1],))
-    standard = keras.layers.Normalization(mean=mean.tolist(), variance=np.square(deviation).tolist())(given)
+    standard = keras.layers.Normalization(
+        mean=mean.tolist(), variance=np.square(deviation).tolist()
+    )(given)
     line = keras.layers.Dense(1, name="linear")
     linear = line(standard[:, :num_linear])
     line.set_weights([coefficients[:-1], coefficients[-1]])
     hidden = ops.clip(standard[:, num_far:], -_CLIP, _CLIP)
     for number in (1, 2):
-        hidden = keras.layers.Dense(_UNITS, "swish", kernel_initializer=seeded_initialiser("he_uniform", seed * 1000 + number))(hidden)
-    small = keras.initializers.VarianceScaling(0.01, seed=seed * 1000 + 3)  # nearly one density at first
+        hidden = keras.layers.Dense(
+            _UNITS,
+            "swish",
+            kernel_initializer=seeded_initialiser("he_uniform", seed * 1000 + number),
+        )(hidden)
+    small = keras.initializers.VarianceScaling(
+        0.01, seed=seed * 1000 + 3
+    )  # nearly one density at first
     apart = np.linspace(-0.3, 0.3, _NUM_COMPONENTS)  # components differ a little in mean and scale
     bias = keras.initializers.Constant(np.concatenate([_FIRST_LOGITS, apart, apart[::-1]]))
-    mixture = keras.layers.Dense(3 * _NUM_COMPONENTS, kernel_initializer=small, bias_initializer=bias)(hidden)
+    mixture = keras.layers.Dense(
+        3 * _NUM_COMPONENTS, kernel_initializer=small, bias_initializer=bias
+    )(hidden)
     logits, shifts, log_scales = ops.split(mixture, 3, axis=1)
     log_scales = float(np.log(error)) + ops.clip(log_scales, *_LOG_SCALES)
-    return keras.Model(given, ops.concatenate([logits, linear + error * shifts, log_scales], axis=1), name="mixture_density")
+    return keras.Model(
+        given,
+        ops.concatenate([logits, linear + error * shifts, log_scales], axis=1),
+        name="mixture_density",
+    )
 
 
-def negative_log_likelihood(targets: keras.KerasTensor, mixture: keras.KerasTensor) -> keras.KerasTensor:
+def negative_log_likelihood(
+    targets: keras.KerasTensor, mixture: keras.KerasTensor
+) -> keras.KerasTensor:
     """Mean negative logarithm of the density of samples of shape `(samples, 1)`, by the output of the network."""
     logits, means, log_scales = ops.split(mixture, 3, axis=1)
     squares = ops.square((targets - means) * ops.exp(-log_scales))

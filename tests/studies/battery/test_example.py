@@ -14,12 +14,19 @@ FOLDER = Path(__file__).parents[3] / "examples" / "battery"
 
 @pytest.mark.slow
 def test_the_pair_is_simulated_again_as_it_is_and_its_fault_raises_the_resistance():
-    pytest.importorskip("pybamm", reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'")
+    pytest.importorskip(
+        "pybamm", reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'"
+    )
     tables = example.tables(num_orbits=1, num_fault_orbits=4)
     assert set(tables) == {path.stem for path in FOLDER.glob("*.csv")}
     shipped = pd.read_csv(FOLDER / "simulator.csv")
-    np.testing.assert_allclose(*(table[: ORBIT_SAMPLES // 2].astype(float) for table in (tables["simulator"], shipped)), atol=0.02)
-    planned, faulty, measured = (tables[name] for name in ("simulator_planned", "simulator_fault", "telemetry_fault"))
+    np.testing.assert_allclose(
+        *(table[: ORBIT_SAMPLES // 2].astype(float) for table in (tables["simulator"], shipped)),
+        atol=0.02,
+    )
+    planned, faulty, measured = (
+        tables[name] for name in ("simulator_planned", "simulator_fault", "telemetry_fault")
+    )
     assert planned[["time", "amperes"]].equals(faulty[["time", "amperes"]])
     assert faulty["mask"].tolist() == [0] * ORBIT_SAMPLES + [1] * 3 * ORBIT_SAMPLES
     assert (planned["volts"] == faulty["volts"])[:ORBIT_SAMPLES].all()

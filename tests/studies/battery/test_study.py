@@ -35,16 +35,25 @@ def _added(fault):
 def recorded():
     runs, rng = {}, np.random.default_rng(0)
     for part, orbits in (("fit", 16), ("more", 8), ("test", 8), ("coarse", 16)):
-        runs[run_key(part, "coarse")], runs[run_key(part, "fine")] = _run(draw_load(orbits + 1, GENTLE, rng))
+        runs[run_key(part, "coarse")], runs[run_key(part, "fine")] = _run(
+            draw_load(orbits + 1, GENTLE, rng)
+        )
     load = draw_load(3, GENTLE, rng)
     for fault in (None, *ALL):
-        runs[run_key("fault", "coarse", fault)], runs[run_key("fault", "fine", fault)] = _run(load, _added(fault))
+        runs[run_key("fault", "coarse", fault)], runs[run_key("fault", "fine", fault)] = _run(
+            load, _added(fault)
+        )
     return runs
 
 
 @pytest.fixture(autouse=True)
 def small_numbers(monkeypatch):
-    counts = {"NUM_TEST": 80, "NUM_FAULT": 10, "NUM": 100, "WINDOW": 100}  # few orbits are enough to learn short windows from
+    counts = {
+        "NUM_TEST": 80,
+        "NUM_FAULT": 10,
+        "NUM": 100,
+        "WINDOW": 100,
+    }  # few orbits are enough to learn short windows from
     for module in (detectors, record):
         for name in counts.keys() & vars(module).keys():
             monkeypatch.setattr(module, name, counts[name])
@@ -55,7 +64,9 @@ def pairs(recorded):
     return pair_windows(recorded, "fit", 300, 0)
 
 
-def test_windows_of_both_simulators_cover_the_same_time_and_share_the_noise_of_their_common_samples(recorded):
+def test_windows_of_both_simulators_cover_the_same_time_and_share_the_noise_of_their_common_samples(
+    recorded,
+):
     each, fine = pair_windows(recorded, "test", 200, 1), recorded[run_key("test", "fine")][:, 0]
     assert each.starts.min() >= ORBIT_SAMPLES and each.starts.max() + record.WINDOW <= len(fine)
     inside = slice(each.starts[7], each.starts[7] + record.WINDOW)
@@ -68,9 +79,14 @@ def test_windows_of_both_simulators_cover_the_same_time_and_share_the_noise_of_t
 
 def test_the_residual_finds_the_fault_that_the_planned_run_does_not_have(recorded, pairs):
     judge = Judge(recorded, pairs, RIDGE, 0)
-    rows = {(row["training"], row["fault"], row["severity"]): row["alarms"] for row in judge.reference_rows()}
+    rows = {
+        (row["training"], row["fault"], row["severity"]): row["alarms"]
+        for row in judge.reference_rows()
+    }
     for reference in (ENHANCED_RUN, COARSE_RUN):
-        assert rows[reference, "raised resistance", 1.0] > 0.5  # not all: the current is small where the battery is nearly full
+        assert (
+            rows[reference, "raised resistance", 1.0] > 0.5
+        )  # not all: the current is small where the battery is nearly full
     assert rows[ENHANCED_RUN, "nominal", 0.0] < 0.1
 
 
@@ -85,7 +101,19 @@ def test_training_and_threshold_share_no_orbit_and_are_drawn_by_the_seed(recorde
 def test_without_pybamm_the_command_says_what_to_install(monkeypatch, capsys, tmp_path):
     monkeypatch.setitem(sys.modules, "pybamm", None)
     simulate.import_pybamm.cache_clear()
-    assert command(["--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]) == 2
+    assert (
+        command(
+            [
+                "--budget",
+                "smoke",
+                "--out",
+                str(tmp_path / "out"),
+                "--cache",
+                str(tmp_path / "cache"),
+            ]
+        )
+        == 2
+    )
     (line,) = capsys.readouterr().err.splitlines()
     assert "pip install 'enhsim_tf[battery]'" in line
     simulate.import_pybamm.cache_clear()

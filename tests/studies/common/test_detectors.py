@@ -3,28 +3,48 @@
 import numpy as np
 import pytest
 
-from studies.common.detectors import DETECTORS, ConvolutionalAutoencoder, DenseAutoencoder, NearestNeighbours
+from studies.common.detectors import (
+    DETECTORS,
+    ConvolutionalAutoencoder,
+    DenseAutoencoder,
+    NearestNeighbours,
+)
 from tests.detection.test_detectors import waves
 
 
 @pytest.mark.parametrize(
-    "name", ["nearest neighbours", "isolation forest", "one-class SVM", "dense autoencoder", "convolutional autoencoder"]
+    "name",
+    [
+        "nearest neighbours",
+        "isolation forest",
+        "one-class SVM",
+        "dense autoencoder",
+        "convolutional autoencoder",
+    ],
 )
 def test_louder_noise_is_found_and_the_seed_gives_the_scores(name):
     training, nominal, noisy = waves(400, 0), waves(60, 3), waves(60, 1, noise_sd=0.4)
     first, again, other = (DETECTORS[name](seed).fit(training) for seed in (3, 3, 4))
     assert np.mean(first.score(noisy)[:, None] > first.score(nominal)) > 0.95
     np.testing.assert_array_equal(first.score(nominal), again.score(nominal))
-    assert (first.score(nominal) != other.score(nominal)).any() == ("autoencoder" in name or "forest" in name)
+    assert (first.score(nominal) != other.score(nominal)).any() == (
+        "autoencoder" in name or "forest" in name
+    )
 
 
 def test_distance_to_the_neighbours_by_hand():
     training = np.array([[0.0, 0], [3, 4], [0, 1], [100, 100]])
     detector = NearestNeighbours(num_neighbours=2).fit(training)
-    assert detector.score(np.array([[0.0, 0], [6, 8], [100, 100]])) == pytest.approx([0.5, (5 + np.hypot(6, 7)) / 2, np.hypot(97, 96) / 2])
-    assert NearestNeighbours(9).fit(training).score(training[:1]) == pytest.approx((0 + 5 + 1 + np.hypot(100, 100)) / 4)
+    assert detector.score(np.array([[0.0, 0], [6, 8], [100, 100]])) == pytest.approx(
+        [0.5, (5 + np.hypot(6, 7)) / 2, np.hypot(97, 96) / 2]
+    )
+    assert NearestNeighbours(9).fit(training).score(training[:1]) == pytest.approx(
+        (0 + 5 + 1 + np.hypot(100, 100)) / 4
+    )
     # a large offset leaves the distances as they are
-    assert NearestNeighbours(2).fit(training + 2.0**30).score(np.array([[6.0, 8]]) + 2.0**30) == pytest.approx((5 + np.hypot(6, 7)) / 2)
+    assert NearestNeighbours(2).fit(training + 2.0**30).score(
+        np.array([[6.0, 8]]) + 2.0**30
+    ) == pytest.approx((5 + np.hypot(6, 7)) / 2)
 
 
 @pytest.mark.parametrize("kind", [ConvolutionalAutoencoder, DenseAutoencoder])

@@ -18,7 +18,9 @@ def trial(rate=0.1):
 
 def test_every_kind_and_severity_is_there_at_the_same_places():
     made = trial()
-    assert set(made.anomalous) == {(kind, severity) for kind in INJECTIONS for severity in SEVERITIES}
+    assert set(made.anomalous) == {
+        (kind, severity) for kind in INJECTIONS for severity in SEVERITIES
+    }
     chosen = made.nominal[np.linspace(0, 119, 30).astype(int)]
     in_thirds = np.concatenate([chosen[number::3] for number in range(3)])
     changed = {key: windows != in_thirds for key, windows in made.anomalous.items()}
@@ -35,12 +37,18 @@ def test_rates_worked_by_hand():
     found = evaluate_arm(noise(50, 4), held_out, made, {"largest": lambda seed: Largest()}, seed=0)
     threshold = np.sort(held_out.max(axis=1))[89]  # rank ceil(100 * 0.9) of 99
     alarms = made.nominal.max(axis=1) > threshold
-    assert [row["alarms"] for row in found["alarms"]] == [int(block.sum()) for block in np.split(alarms, 10)]
+    assert [row["alarms"] for row in found["alarms"]] == [
+        int(block.sum()) for block in np.split(alarms, 10)
+    ]
     assert [row["windows"] for row in found["alarms"]] == [12] * 10
-    (row,) = [row for row in found["recall"] if (row["kind"], row["severity"]) == ("level_shift", 4.0)]
+    (row,) = [
+        row for row in found["recall"] if (row["kind"], row["severity"]) == ("level_shift", 4.0)
+    ]
     scores = made.anomalous["level_shift", 4.0].max(axis=1)
     assert row["recall"] == np.mean(scores > threshold)
-    assert row["recall_at_real_rate"] == np.mean(scores > metrics.threshold(made.reference.max(axis=1), 0.1))
+    assert row["recall_at_real_rate"] == np.mean(
+        scores > metrics.threshold(made.reference.max(axis=1), 0.1)
+    )
     assert len(found["recall"]) == len(INJECTIONS) * len(SEVERITIES)
 
 

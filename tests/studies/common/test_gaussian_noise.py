@@ -9,19 +9,27 @@ from studies.common.gaussian_noise import GaussianAutoregression, GaussianNoise
 
 
 def test_gaussian_noise_of_several_channels_keeps_their_covariance():
-    covariance = np.array([[4.0, 1.2, 0.0], [1.2, 1.0, 0.0], [0.0, 0.0, 0.0]])  # the third channel is constant
-    source = default_rng(0).multivariate_normal(np.zeros(3), covariance, (400, 100)).astype(np.float32)
+    covariance = np.array(
+        [[4.0, 1.2, 0.0], [1.2, 1.0, 0.0], [0.0, 0.0, 0.0]]
+    )  # the third channel is constant
+    source = (
+        default_rng(0).multivariate_normal(np.zeros(3), covariance, (400, 100)).astype(np.float32)
+    )
     fitted = GaussianNoise.fit(source)
     assert fitted.root @ fitted.root.T == pytest.approx(covariance, abs=5 * 4 * np.sqrt(2 / 40_000))
     noise = fitted.generate(500, default_rng(1))
     assert noise.shape == (500, 100, 3) and noise.dtype == np.float32
-    assert np.cov(noise.reshape(-1, 3), rowvar=False) == pytest.approx(fitted.root @ fitted.root.T, abs=5 * 4 * np.sqrt(2 / 50_000))
+    assert np.cov(noise.reshape(-1, 3), rowvar=False) == pytest.approx(
+        fitted.root @ fitted.root.T, abs=5 * 4 * np.sqrt(2 / 50_000)
+    )
     assert fitted.generate_series(30, default_rng(1)).shape == (30, 3)
 
 
 def second_order(first, second, number, samples, seed):
     """Windows of an AR(2) process with innovations of standard deviation 1, after a burn-in of 500 samples."""
-    return lfilter([1.0], [1.0, -first, -second], default_rng(seed).standard_normal((number, samples + 500)))[:, 500:]
+    return lfilter(
+        [1.0], [1.0, -first, -second], default_rng(seed).standard_normal((number, samples + 500))
+    )[:, 500:]
 
 
 def criterion(windows, order):
@@ -29,7 +37,10 @@ def criterion(windows, order):
     targets = windows[:, 8:].ravel()
     if order == 0:
         return targets.size * np.log(np.mean(targets**2))
-    past = np.stack([windows[:, 8 - lag : windows.shape[1] - lag].ravel() for lag in range(1, order + 1)], axis=1)
+    past = np.stack(
+        [windows[:, 8 - lag : windows.shape[1] - lag].ravel() for lag in range(1, order + 1)],
+        axis=1,
+    )
     errors = targets - past @ np.linalg.lstsq(past, targets)[0]
     return targets.size * np.log(np.mean(errors**2)) + 2 * order
 
@@ -47,7 +58,9 @@ def test_akaike_chooses_the_order_that_least_squares_would():
     windows = second_order(1.2, -0.5, 100, 200, seed=0)
     chosen = len(GaussianAutoregression.fit(windows, max_order=8).coefficients)
     assert chosen == np.argmin([criterion(windows, order) for order in range(9)]) >= 2
-    assert np.abs(GaussianAutoregression.fit(windows).coefficients[2:]) == pytest.approx(0, abs=5 / np.sqrt(windows.size))
+    assert np.abs(GaussianAutoregression.fit(windows).coefficients[2:]) == pytest.approx(
+        0, abs=5 / np.sqrt(windows.size)
+    )
 
 
 def test_generated_autoregression_is_stationary_and_has_the_closed_form():
@@ -61,27 +74,50 @@ def test_generated_autoregression_is_stationary_and_has_the_closed_form():
         expected.append(first * expected[-1] + second * expected[-2])
     sd = 0.3 / np.sqrt(1 - first * expected[1] - second * expected[2])
     # five standard errors, at every sample: the first has the variance of the last
-    assert np.std(noise, axis=0, dtype=np.float64) == pytest.approx(np.full(samples, sd), rel=5 / np.sqrt(2 * number))
+    assert np.std(noise, axis=0, dtype=np.float64) == pytest.approx(
+        np.full(samples, sd), rel=5 / np.sqrt(2 * number)
+    )
     for begin in (0, 1, 20):
-        products = np.mean(noise[:, begin : begin + 1].astype(np.float64) * noise[:, begin:], axis=0) / sd**2
-        assert products == pytest.approx(np.array(expected[: samples - begin]), abs=5 * np.sqrt(2 / number))
+        products = (
+            np.mean(noise[:, begin : begin + 1].astype(np.float64) * noise[:, begin:], axis=0)
+            / sd**2
+        )
+        assert products == pytest.approx(
+            np.array(expected[: samples - begin]), abs=5 * np.sqrt(2 / number)
+        )
 
 
 def test_joint_autoregression_recovers_the_channels_and_their_cross_correlation():
     number, samples, correlation = 400, 300, 0.8
-    draws = default_rng(0).multivariate_normal([0, 0], [[1, correlation], [correlation, 1]], (number, samples))
-    values = np.stack([lfilter([1.0], [1.0, -memory], draws[:, :, channel]) for channel, memory in enumerate((0.9, -0.5))], axis=2)
+    draws = default_rng(0).multivariate_normal(
+        [0, 0], [[1, correlation], [correlation, 1]], (number, samples)
+    )
+    values = np.stack(
+        [
+            lfilter([1.0], [1.0, -memory], draws[:, :, channel])
+            for channel, memory in enumerate((0.9, -0.5))
+        ],
+        axis=2,
+    )
     fitted = GaussianNoise.fit_autoregressions(values[:, 100:] * [2.0, 7.0], max_order=1)
     error = 5 / np.sqrt(number * 200)
     for each, coefficient, scale in zip(fitted.processes, (0.9, -0.5), (2.0, 7.0), strict=True):
-        assert each.coefficients == pytest.approx([coefficient], abs=error) and each.innovation_sd == pytest.approx(scale, rel=error)
-    assert fitted.root @ fitted.root.T == pytest.approx(np.array([[1, correlation], [correlation, 1]]), abs=error)
+        assert each.coefficients == pytest.approx(
+            [coefficient], abs=error
+        ) and each.innovation_sd == pytest.approx(scale, rel=error)
+    assert fitted.root @ fitted.root.T == pytest.approx(
+        np.array([[1, correlation], [correlation, 1]]), abs=error
+    )
     noise = fitted.generate(2_000, default_rng(1))[:, 150:]
     assert noise.shape == (2_000, 50, 2) and noise.dtype == np.float32
     # closed form of two AR(1): E xy = c / (1 - ab), E xx = 1 / (1 - a^2), E yy = 1 / (1 - b^2)
     expected = correlation / (1 + 0.9 * 0.5) * np.sqrt((1 - 0.9**2) * (1 - 0.5**2))
-    assert np.corrcoef(noise.reshape(-1, 2), rowvar=False)[0, 1] == pytest.approx(expected, abs=0.01)
-    assert noise.std(axis=(0, 1)) == pytest.approx([2 / np.sqrt(1 - 0.81), 7 / np.sqrt(1 - 0.25)], rel=0.03)
+    assert np.corrcoef(noise.reshape(-1, 2), rowvar=False)[0, 1] == pytest.approx(
+        expected, abs=0.01
+    )
+    assert noise.std(axis=(0, 1)) == pytest.approx(
+        [2 / np.sqrt(1 - 0.81), 7 / np.sqrt(1 - 0.25)], rel=0.03
+    )
     assert fitted.generate_series(30, default_rng(1)).shape == (30, 2)
 
 

@@ -17,13 +17,18 @@ def volume_by_the_definition(labels, ranges, scores, max_buffer):
             for place in range(len(labels)):
                 distance = max(begin - place, place - end, 0)
                 if distance == 0 or distance <= length / 2:
-                    soft[place] = max(soft[place], 1.0 if distance == 0 else math.sqrt(1 - distance / length))
+                    soft[place] = max(
+                        soft[place], 1.0 if distance == 0 else math.sqrt(1 - distance / length)
+                    )
         area, before = 0.0, 0.0
         for level in sorted(set(scores), reverse=True):
             alarms = [place for place, score in enumerate(scores) if score >= level]
             found = sum(soft[place] for place in alarms)
             expected = sum(labels) + sum(soft[place] for place in alarms if not labels[place]) / 2
-            seen = sum(any(begin - length // 2 <= place <= end + length // 2 for place in alarms) for begin, end in ranges)
+            seen = sum(
+                any(begin - length // 2 <= place <= end + length // 2 for place in alarms)
+                for begin, end in ranges
+            )
             reached = min(1, found / expected) * seen / len(ranges)
             area += (reached - before) * found / len(alarms)
             before = reached
@@ -49,14 +54,21 @@ def test_volume_of_one_range_by_hand():
 def test_volume_is_that_of_the_definition(ranges, seed):
     rng = np.random.default_rng(seed)
     labels = np.array([any(begin <= place <= end for begin, end in ranges) for place in range(60)])
-    scores = rng.random(60) + 0.5 * labels if seed % 2 else rng.integers(0, 7, 60)  # without and with ties
+    scores = (
+        rng.random(60) + 0.5 * labels if seed % 2 else rng.integers(0, 7, 60)
+    )  # without and with ties
     for max_buffer in (0, 5, 16):
         expected = volume_by_the_definition(labels, ranges, scores.tolist(), max_buffer)
         assert vus_pr(labels, scores, max_buffer) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("labels", "scores", "words"), [([0, 0], [1, 2], "0 anomalous"), ([0, 1], [1, np.nan], "1 nan"), ([0, 1], [1, 2, 3], "(2,) and (3,)")]
+    ("labels", "scores", "words"),
+    [
+        ([0, 0], [1, 2], "0 anomalous"),
+        ([0, 1], [1, np.nan], "1 nan"),
+        ([0, 1], [1, 2, 3], "(2,) and (3,)"),
+    ],
 )
 def test_volumes_that_are_refused(refused, labels, scores, words):
     with refused(words):

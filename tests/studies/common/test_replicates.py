@@ -12,16 +12,37 @@ from studies.common.settings import make_settings
 from studies.common.tables import KeptTables
 
 
-def test_a_study_joins_the_tables_of_its_replicates_and_computes_findings_from_what_it_wrote(tmp_path, monkeypatch):
+def test_a_study_joins_the_tables_of_its_replicates_and_computes_findings_from_what_it_wrote(
+    tmp_path, monkeypatch
+):
     def tables_of(name, seed, stages):
         assert stages.cache == tmp_path / "cache"
-        return {"rows": pd.DataFrame({"value": [seed + {"a": 0.123, "b": 0.5}[name]]})} if (name, seed) != ("b", 3_000) else {}
+        return (
+            {"rows": pd.DataFrame({"value": [seed + {"a": 0.123, "b": 0.5}[name]]})}
+            if (name, seed) != ("b", 3_000)
+            else {}
+        )
 
     kept = KeptTables(names=("rows",), labels=(), digits=1, command="x")
-    made = types.SimpleNamespace(KEPT=kept, summarise=lambda read: {"values": read["rows"]["value"].tolist()}, FIGURES={})
-    monkeypatch.setattr(replicates, "importlib", types.SimpleNamespace(import_module=lambda name: made))
-    options, settings = argparse.Namespace(cache=tmp_path / "cache", fresh=False), make_settings("smoke", battery__num_seeds=2)
-    found = replicates.run_study("battery", tables_of, ("a", "b"), options, settings, tmp_path, {"versions": {"other": "1"}})
-    assert found["values"] == pytest.approx([3_000.1, 3_001.1, 3_001.5])  # rounded as they are stored; one replicate is left out
-    assert found["budget"] == "smoke" and found["versions"]["other"] == "1" and "tensorflow" in found["versions"]
+    made = types.SimpleNamespace(
+        KEPT=kept, summarise=lambda read: {"values": read["rows"]["value"].tolist()}, FIGURES={}
+    )
+    monkeypatch.setattr(
+        replicates, "importlib", types.SimpleNamespace(import_module=lambda name: made)
+    )
+    options, settings = (
+        argparse.Namespace(cache=tmp_path / "cache", fresh=False),
+        make_settings("smoke", battery__num_seeds=2),
+    )
+    found = replicates.run_study(
+        "battery", tables_of, ("a", "b"), options, settings, tmp_path, {"versions": {"other": "1"}}
+    )
+    assert found["values"] == pytest.approx(
+        [3_000.1, 3_001.1, 3_001.5]
+    )  # rounded as they are stored; one replicate is left out
+    assert (
+        found["budget"] == "smoke"
+        and found["versions"]["other"] == "1"
+        and "tensorflow" in found["versions"]
+    )
     assert json.loads((tmp_path / "findings.json").read_text()) == found

@@ -20,23 +20,40 @@ def test_the_interval_of_crossed_data_has_the_width_that_the_bootstrap_has_in_cl
     by_environment, by_seed = rng.normal(size=(num_e, 1, 1)), 0.8 * rng.normal(size=(1, num_s, 1))
     values = 3 + by_environment + by_seed + 0.7 * rng.normal(size=(num_e, num_s, num_rows))
     cells = values.mean(axis=2) - values.mean()
-    rows, columns = (1 - 1 / num_s) * (cells.sum(axis=1) ** 2).sum(), (1 - 1 / num_e) * (cells.sum(axis=0) ** 2).sum()
-    variance = ((cells**2).sum() + rows + columns) / cells.size**2 + values.var(axis=2).mean() / values.size
-    index = pd.MultiIndex.from_product([range(num_e), range(num_s), range(num_rows)], names=["environment", "seed", "block"])
-    interval = mean_interval(pd.Series(values.ravel(), index).sample(frac=1, random_state=2), num_resamples=20_000)
+    rows, columns = (
+        (1 - 1 / num_s) * (cells.sum(axis=1) ** 2).sum(),
+        (1 - 1 / num_e) * (cells.sum(axis=0) ** 2).sum(),
+    )
+    variance = ((cells**2).sum() + rows + columns) / cells.size**2 + values.var(
+        axis=2
+    ).mean() / values.size
+    index = pd.MultiIndex.from_product(
+        [range(num_e), range(num_s), range(num_rows)], names=["environment", "seed", "block"]
+    )
+    interval = mean_interval(
+        pd.Series(values.ravel(), index).sample(frac=1, random_state=2), num_resamples=20_000
+    )
     assert interval["mean"] == pytest.approx(values.mean())
-    assert half_width(interval) == pytest.approx(scipy.stats.norm.ppf(0.975) * np.sqrt(variance), rel=0.04)
+    assert half_width(interval) == pytest.approx(
+        scipy.stats.norm.ppf(0.975) * np.sqrt(variance), rel=0.04
+    )
 
 
 def test_a_factor_whose_labels_all_do_the_same_leaves_the_others_scatter():
     index = pd.MultiIndex.from_product([["white", "shot"], [1, 2]], names=["environment", "seed"])
     values = pd.Series([1.0, 3.0, 1.0, 3.0], index)
     assert mean_interval(values) == {"mean": 2.0, "low": 1.0, "high": 3.0}
-    assert mean_interval(values, ["environment"]) == {"mean": 2.0, "low": 1.0, "high": 3.0}  # the seeds are rows of its cells
+    assert mean_interval(values, ["environment"]) == {
+        "mean": 2.0,
+        "low": 1.0,
+        "high": 3.0,
+    }  # the seeds are rows of its cells
 
 
 def test_intervals_refuse_what_is_not_crossed(refused):
-    values = pd.Series(1.0, pd.MultiIndex.from_product([[0, 1], [0, 1]], names=["environment", "seed"]))
+    values = pd.Series(
+        1.0, pd.MultiIndex.from_product([[0, 1], [0, 1]], names=["environment", "seed"])
+    )
     with refused("0 to 1 rows a cell"):
         mean_interval(values[:3])
     with refused("1 not finite"):

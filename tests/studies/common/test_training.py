@@ -7,14 +7,20 @@ from studies.common.training import dense_stack
 
 
 def test_layers_and_seeds_are_independent():
-    first, second = (np.ravel(layer.kernel) for layer in dense_stack(50, (50, 50, 50), seed=0, name="equal").layers[:2])
+    first, second = (
+        np.ravel(layer.kernel)
+        for layer in dense_stack(50, (50, 50, 50), seed=0, name="equal").layers[:2]
+    )
     other = np.ravel(dense_stack(50, (50, 50), seed=1, name="other").layers[0].kernel)
     for each in (second, other):
         assert abs(np.corrcoef(first, each)[0, 1]) < 5 / 50
 
 
 def test_a_dense_stack_is_relu_layers_and_a_linear_one():
-    model, coarse = dense_stack(20, (20, 64, 64, 20), 0, "enhancer"), np.random.default_rng(0).standard_normal((300, 20)).astype(np.float32)
+    model, coarse = (
+        dense_stack(20, (20, 64, 64, 20), 0, "enhancer"),
+        np.random.default_rng(0).standard_normal((300, 20)).astype(np.float32),
+    )
     expected = coarse.astype(np.float64)
     for number, layer in enumerate(model.layers):
         expected = expected @ np.asarray(layer.kernel) + np.asarray(layer.bias)

@@ -20,7 +20,9 @@ SMALL |= {"paper__iterations": 1, "paper__record_every": 1}
 
 @pytest.fixture(scope="module")
 def without_networks(tmp_path_factory):
-    return Pipelines(Replicate(make_settings("smoke", **SMALL), Stages(tmp_path_factory.mktemp("cache"))))
+    return Pipelines(
+        Replicate(make_settings("smoke", **SMALL), Stages(tmp_path_factory.mktemp("cache")))
+    )
 
 
 def test_whole_windows_of_the_residual_are_added_to_the_signal(without_networks):
@@ -30,21 +32,29 @@ def test_whole_windows_of_the_residual_are_added_to_the_signal(without_networks)
     extracted = one.extracted(*cell.source)
     assert extracted.shape == (90, 500)
     for window in noise:
-        assert np.abs(extracted - window).max(axis=1).min() < 1e-5  # each is one of the extracted windows
+        assert (
+            np.abs(extracted - window).max(axis=1).min() < 1e-5
+        )  # each is one of the extracted windows
 
 
 def test_the_residual_is_telemetry_minus_the_signal_and_keeps_its_scale(without_networks):
     residual, averaged = (
-        without_networks.extracted(*Cell("many", kind, "ridge", "autoregression").source) for kind in ("residual", "moving average")
+        without_networks.extracted(*Cell("many", kind, "ridge", "autoregression").source)
+        for kind in ("residual", "moving average")
     )
     assert np.std(residual) == pytest.approx(0.1, rel=0.1)  # the noise of the example telemetry
-    assert np.std(averaged) == pytest.approx(0.1 * np.sqrt(1 - 1 / 25), rel=0.05)  # what a moving average of 25 samples leaves
+    assert np.std(averaged) == pytest.approx(
+        0.1 * np.sqrt(1 - 1 / 25), rel=0.05
+    )  # what a moving average of 25 samples leaves
 
 
 def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable(without_networks):
     one, cell = without_networks, Cell("few", "moving average", "ridge", "autoregression")
     assert [len(one.training_starts(windows)) for windows in ("few", "many")] == [40, 90]
-    assert np.array_equal(one.pairs(one.training_starts("few"))[1], one.example.windows("train", 40, "training windows")["target"])
+    assert np.array_equal(
+        one.pairs(one.training_starts("few"))[1],
+        one.example.windows("train", 40, "training windows")["target"],
+    )
     first, other = (one.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
     assert first.shape == other.shape == (30, 500) and not np.allclose(first, other)
     assert np.array_equal(Pipelines(one.replicate).arm(cell, TRAINING), first)
@@ -53,7 +63,16 @@ def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable
 def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_path, monkeypatch):
     def judged(self, cell):
         alarms = {"coarse": 50, "real": 1}.get(cell, 9)
-        return [{"detector": name, "alarms": alarms, "windows": 59, "recall": 0.5, "recall_at_real_rate": 0.25} for name in DETECTORS]
+        return [
+            {
+                "detector": name,
+                "alarms": alarms,
+                "windows": 59,
+                "recall": 0.5,
+                "recall_at_real_rate": 0.25,
+            }
+            for name in DETECTORS
+        ]
 
     monkeypatch.setattr(Pipelines, "judged", judged)
     options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
@@ -68,7 +87,9 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("narrow_enhancer")
-def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_coarse_reference(tmp_path):
+def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_coarse_reference(
+    tmp_path,
+):
     settings = make_settings("smoke", paper__hidden_units=64, **SMALL).of("shot", 0)
     one = Pipelines(Replicate(settings, Stages(tmp_path)))
     coarse = one.arm("coarse", TRAINING)
@@ -78,5 +99,6 @@ def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_co
     ):
         rng = np.random.default_rng(int(one.example.draw(TRAINING).integers(2**31)))
         assert np.array_equal(
-            one.arm(cell, TRAINING), enhance(coarse) + one.generator(cell).generate(len(coarse), rng).reshape(coarse.shape)
+            one.arm(cell, TRAINING),
+            enhance(coarse) + one.generator(cell).generate(len(coarse), rng).reshape(coarse.shape),
         )

@@ -11,7 +11,11 @@ from studies.factorial.cells import LEVELS
 
 def test_contributions_add_up_and_agree_with_the_orders():
     rng = np.random.default_rng(0)
-    worth = {frozenset(each): rng.standard_normal() for size in range(5) for each in itertools.combinations(LEVELS, size)}
+    worth = {
+        frozenset(each): rng.standard_normal()
+        for size in range(5)
+        for each in itertools.combinations(LEVELS, size)
+    }
     for factor in LEVELS:  # the definition: the mean change over all orders of switching
         changes = []
         for order in itertools.permutations(LEVELS):

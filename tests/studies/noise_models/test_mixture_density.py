@@ -25,13 +25,17 @@ def test_an_autoregression_is_recovered():
     assert generated.std() == pytest.approx(0.3 / np.sqrt(1 - 0.7**2), rel=0.05)
     assert autocorrelation(generated, 2)[1:] == pytest.approx([0.7, 0.49], abs=0.05)
     # the mean negative log-likelihood of the innovations, in standard deviations of the noise
-    assert min(model.losses) == pytest.approx(0.5 * np.log(2 * np.pi * np.e * (1 - 0.7**2)), abs=0.03)
+    assert min(model.losses) == pytest.approx(
+        0.5 * np.log(2 * np.pi * np.e * (1 - 0.7**2)), abs=0.03
+    )
 
 
 def test_noise_that_grows_with_the_signal_is_recovered():
     rng = np.random.default_rng(2)
     signal = _windows(np.sin(2 * np.pi * np.arange(800 * WINDOW) / 50))
-    model = MixtureDensityNoise(seed=3, num_steps=200).fit((1 + 0.5 * signal) * rng.standard_normal(signal.shape), signal)
+    model = MixtureDensityNoise(seed=3, num_steps=200).fit(
+        (1 + 0.5 * signal) * rng.standard_normal(signal.shape), signal
+    )
     generated = model.generate(800, rng, signal)
     slope, offset = np.polyfit(signal.ravel(), np.abs(generated).ravel() / np.sqrt(2 / np.pi), 1)
     assert (slope, offset) == pytest.approx((0.5, 1.0), abs=0.07)

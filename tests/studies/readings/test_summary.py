@@ -29,7 +29,9 @@ def published_table():
 def test_the_plan_has_both_roundings_of_the_reference_and_complete_first_seeds():
     planned = runs(10, 5)
     assert len(planned) == len(set(planned)) == 10 * 2 + 5 * (len(READINGS) - 1)
-    assert set(runs(10, 5, on_another=True) + planned) == {Run(*row) for row in published_table()[runs_of.KEYS].itertuples(index=False)}
+    assert set(runs(10, 5, on_another=True) + planned) == {
+        Run(*row) for row in published_table()[runs_of.KEYS].itertuples(index=False)
+    }
     assert {run.seed for run in planned[: len(READINGS) + 1]} == {0}
 
 
@@ -40,9 +42,18 @@ def test_the_plan_has_both_roundings_of_the_reference_and_complete_first_seeds()
         (lambda run: True, ("not reproduced", 6, None)),
         (lambda run: run == Run("reference", "Eigen", 2), ("reproduced", 5, None)),  # 83 %
         (lambda run: run.reading == "reference" and run.seed == 2, (UNDECIDED, 4, "seed")),  # 67 %
-        (lambda run: run.reading == "15,000 windows", ("reproduced", 6, None)),  # one of three readings that touch the enhancer
-        (lambda run: run.reading in ("15,000 windows", "learning rate 0.01"), (UNDECIDED, 6, "learning rate 0.01, 15,000 windows")),
-        (lambda run: run.reading == "no dropout", ("reproduced", 6, None)),  # does not touch the enhancer
+        (
+            lambda run: run.reading == "15,000 windows",
+            ("reproduced", 6, None),
+        ),  # one of three readings that touch the enhancer
+        (
+            lambda run: run.reading in ("15,000 windows", "learning rate 0.01"),
+            (UNDECIDED, 6, "learning rate 0.01, 15,000 windows"),
+        ),
+        (
+            lambda run: run.reading == "no dropout",
+            ("reproduced", 6, None),
+        ),  # does not touch the enhancer
     ],
 )
 def test_a_verdict_needs_most_seeds_of_the_reference_and_most_readings(bad, expected):
@@ -51,7 +62,11 @@ def test_a_verdict_needs_most_seeds_of_the_reference_and_most_readings(bad, expe
 
 
 def test_the_stages_that_claims_depend_on_exist():
-    stages = {stage for field in make_settings().__dataclass_fields__.values() for stage in field.metadata["stages"]}
+    stages = {
+        stage
+        for field in make_settings().__dataclass_fields__.values()
+        for stage in field.metadata["stages"]
+    }
     assert set.union(*TOUCHED_BY.values()) < stages
     assert touches("two updates of 200 rows", "C6") and not touches("two updates of 200 rows", "C1")
     assert touches("he_uniform in every layer", "C1") and not touches("no dropout", "C4")
@@ -66,7 +81,9 @@ def test_a_finished_run_is_kept_and_not_done_again(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         done.append((Run(reading, rounding, int(seed)), env["TF_ENABLE_ONEDNN_OPTS"]))
         rows = [(reading, rounding, int(seed), "C1", name, value) for name, value in GOOD.items()]
-        pd.DataFrame(rows, columns=[*runs_of.KEYS, "claim", "name", "value"]).to_parquet(path, index=False)
+        pd.DataFrame(rows, columns=[*runs_of.KEYS, "claim", "name", "value"]).to_parquet(
+            path, index=False
+        )
 
     monkeypatch.setattr(runs_of.subprocess, "run", fake)
     planned, arguments = runs(1, 1)[:4], ("smoke", tmp_path / "cache", tmp_path, lambda line: None)
@@ -81,7 +98,9 @@ def test_a_finished_run_is_kept_and_not_done_again(tmp_path, monkeypatch):
 
 def test_the_figure_shows_a_share_for_each_reading_that_touches_a_claim():
     found = shares(verdicts(table_of(lambda run: run.seed == 0)))
-    assert found.groupby("reading")["share"].sum().to_dict() == pytest.approx({name: 1.0 for name in READINGS if touches(name, "C1")})
+    assert found.groupby("reading")["share"].sum().to_dict() == pytest.approx(
+        {name: 1.0 for name in READINGS if touches(name, "C1")}
+    )
     assert FIGURES["verdicts"].draw({"shares": found}).axes
 
 
@@ -91,8 +110,13 @@ def test_the_published_verdicts_come_from_the_published_table(near):
 
 def test_few_sound_runs_are_outside_the_ranges_of_all_other_seeds():
     table, named = published_table(), []
-    for (reading, rounding, seed), run in table[table["reading"] == "reference"].groupby(runs_of.KEYS):
+    for (reading, rounding, seed), run in table[table["reading"] == "reference"].groupby(
+        runs_of.KEYS
+    ):
         others = publish(table[(table["reading"] != reading) | (table["seed"] != seed)])
-        records = [{"id": claim, "measured": dict(zip(part["name"], part["value"], strict=True))} for claim, part in run.groupby("claim")]
+        records = [
+            {"id": claim, "measured": dict(zip(part["name"], part["value"], strict=True))}
+            for claim, part in run.groupby("claim")
+        ]
         named += [(rounding, seed)] if outside(records, others) else []
     assert named == [("Eigen", 4)]  # its enhancer ended at twice the error of all others

@@ -33,6 +33,9 @@ def test_the_tail_threshold_of_exponential_scores_is_their_quantile():
 @pytest.mark.parametrize("name", ["logistic regression", "boosted trees"])
 def test_a_classifier_scores_shifted_windows_higher(name):
     rng = np.random.default_rng(0)
-    nominal, faulty = rng.standard_normal((200, 20, 2)), rng.standard_normal((200, 20, 2)) + [1.0, 0.0]
+    nominal, faulty = (
+        rng.standard_normal((200, 20, 2)),
+        rng.standard_normal((200, 20, 2)) + [1.0, 0.0],
+    )
     score = classifier(name, nominal[:100], faulty[:100], 0)
     assert np.mean(score(faulty[100:]) > np.median(score(nominal[100:]))) > 0.9

@@ -6,7 +6,14 @@ from studies.reference_or_source.cells import NOMINAL, judged
 from studies.reference_or_source.detectors import conformal_threshold
 from studies.reference_or_source.recordings import COMMANDS, FITTED, record
 from studies.reference_or_source.uses import NO_SIMULATOR, REFERENCE, SOURCE, Cell, Scores
-from studies.reference_or_source.windows import Judged, Windows, delayed, estimated_delays, unit_starts, windows_of
+from studies.reference_or_source.windows import (
+    Judged,
+    Windows,
+    delayed,
+    estimated_delays,
+    unit_starts,
+    windows_of,
+)
 from tests.studies.reference_or_source.toy import Toy
 
 
@@ -42,7 +49,10 @@ def test_an_enhancer_leaves_the_noise_as_residual(runs, simulator):
 
 def test_noise_is_drawn_for_all_channels_at_once_unless_it_is_drawn_separately(runs):
     windows = windows_of(Toy(), runs, "own", 12, 0)
-    joint, separate = (Cell(windows, 0, draws=draws).noise(300, 1).reshape(-1, 2) for draws in ("joint", "separate"))
+    joint, separate = (
+        Cell(windows, 0, draws=draws).noise(300, 1).reshape(-1, 2)
+        for draws in ("joint", "separate")
+    )
     assert np.corrcoef(joint.T)[0, 1] > 0.95 and abs(np.corrcoef(separate.T)[0, 1]) < 0.1
 
 
@@ -52,19 +62,27 @@ def test_a_reference_finds_an_offset_that_telemetry_alone_does_not_show(runs):
     found = {}
     for scores in Cell(windows, 0).scores((REFERENCE, NO_SIMULATOR, SOURCE)):
         alarms = scores.tested > conformal_threshold(scores.known)
-        found[scores.use, scores.detector] = alarms[windows.labels == large].mean(), alarms[windows.labels < 0].mean()
+        found[scores.use, scores.detector] = (
+            alarms[windows.labels == large].mean(),
+            alarms[windows.labels < 0].mean(),
+        )
     assert found[REFERENCE, "size"][0] == 1.0
     assert found[REFERENCE, "size"][1] < 0.05
     assert found[NO_SIMULATOR, "size"][0] < 0.3
     assert found[SOURCE, "size"][0] < 0.3
 
 
-def test_a_classifier_finds_the_kind_of_fault_that_it_has_learnt_in_the_difference_from_the_simulator(runs):
+def test_a_classifier_finds_the_kind_of_fault_that_it_has_learnt_in_the_difference_from_the_simulator(
+    runs,
+):
     windows = windows_of(Toy(), runs, "wrong physics", 12, 0)
     large = windows.faults.index(("offset", 1.0))
     assert {windows.faults[number][0] for number in windows.simulated} == {"offset"}
     for scores in Cell(windows, 0).classified(tuple(windows.simulated), ("reference, faults",)):
-        assert np.mean(scores.tested[windows.labels == large] > conformal_threshold(scores.known)) > 0.9
+        assert (
+            np.mean(scores.tested[windows.labels == large] > conformal_threshold(scores.known))
+            > 0.9
+        )
 
 
 def test_a_channel_of_another_time_keeps_its_values(runs):
@@ -74,7 +92,11 @@ def test_a_channel_of_another_time_keeps_its_values(runs):
     changed = windows.tested.telemetry[moved] != nominal
     assert (changed.any(axis=1).sum(axis=1) == 1).all()
     rows = {row.tobytes() for each in range(2) for row in np.ascontiguousarray(nominal[:, :, each])}
-    assert all(row.tobytes() in rows for each in range(2) for row in np.ascontiguousarray(windows.tested.telemetry[moved][:, :, each]))
+    assert all(
+        row.tobytes() in rows
+        for each in range(2)
+        for row in np.ascontiguousarray(windows.tested.telemetry[moved][:, :, each])
+    )
 
 
 def test_unknown_commands_are_replaced_by_the_most_similar_coarse_window(runs):
@@ -85,7 +107,9 @@ def test_unknown_commands_are_replaced_by_the_most_similar_coarse_window(runs):
         return (values - about.mean(axis=(0, 1))) / about.std(axis=(0, 1))
 
     library = normal(windows.source[:, :, :2], windows.source[:, :, :2])
-    for window, chosen in zip(normal(windows.known.telemetry[:5], windows.known.telemetry), found, strict=True):
+    for window, chosen in zip(
+        normal(windows.known.telemetry[:5], windows.known.telemetry), found, strict=True
+    ):
         nearest = np.argmin(((library - window) ** 2).sum(axis=(1, 2)))
         assert chosen == pytest.approx(windows.source[nearest])
 
@@ -95,8 +119,20 @@ def test_alarms_and_their_beginnings_are_counted():
     tested = np.array([0, 2, 2, 0, 0, 2, 0, 0, 0, 0, 2, 0, 2, 2.0])
     empty = np.zeros((1, 20, 2))
     windows = Judged(
-        Windows(empty, empty, labels, labels), Windows(empty, empty, labels, labels), labels, (("a", 1), ("b", 1)), empty, empty, {}
+        Windows(empty, empty, labels, labels),
+        Windows(empty, empty, labels, labels),
+        labels,
+        (("a", 1), ("b", 1)),
+        empty,
+        empty,
+        {},
     )
-    rows = judged(Toy(), windows, Scores("source", "size", np.ones(1), tested), lambda known: 1.0, True)
-    assert [(row["kind"], row["alarms"]) for row in rows] == [(NOMINAL, 0.3), ("a", 0.5), ("b", 1.0)]
+    rows = judged(
+        Toy(), windows, Scores("source", "size", np.ones(1), tested), lambda known: 1.0, True
+    )
+    assert [(row["kind"], row["alarms"]) for row in rows] == [
+        (NOMINAL, 0.3),
+        ("a", 0.5),
+        ("b", 1.0),
+    ]
     assert rows[0]["events"] == pytest.approx(2 / (10 * 10 / 86_400))

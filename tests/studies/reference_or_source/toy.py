@@ -31,12 +31,18 @@ class Toy:
         return values.astype(np.float32)
 
     def run_real(self, commands, faults=(None,), rng=None):
-        return [self._faulty(np.concatenate([2 * commands, -commands], axis=1), fault) for fault in faults]
+        return [
+            self._faulty(np.concatenate([2 * commands, -commands], axis=1), fault)
+            for fault in faults
+        ]
 
     def run_coarse(self, simulator, commands, faults=(None,), values=None):
         gain = self.simulators[simulator] if values is None else values[0]
         clean = np.concatenate([gain * commands, -commands], axis=1)
-        return [np.concatenate([self._faulty(clean, fault), commands.astype(np.float32)], axis=1) for fault in faults]
+        return [
+            np.concatenate([self._faulty(clean, fault), commands.astype(np.float32)], axis=1)
+            for fault in faults
+        ]
 
     def can_simulate(self, simulator, kind):
         return kind == "offset"

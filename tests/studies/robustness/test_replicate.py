@@ -32,17 +32,39 @@ class Windows:
         return np.random.default_rng(len(purpose))
 
 
-def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise_on_windows_that_are_drawn_once(tmp_path):
+def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise_on_windows_that_are_drawn_once(
+    tmp_path,
+):
     replicate = Replicate(make_settings("smoke"), Stages(tmp_path))
     replicate.example = Windows()
     ridge = types.SimpleNamespace(predict=lambda coarse: coarse + 2_000.0)
-    replicate._without_network = (ridge, types.SimpleNamespace(generate=lambda number, rng: np.full((number, 10), 20.0)))
+    replicate._without_network = (
+        ridge,
+        types.SimpleNamespace(generate=lambda number, rng: np.full((number, 10), 20.0)),
+    )
     for purpose in ("arms, training", "arms, threshold"):
         arms = replicate.arms(purpose)
         assert list(arms) == list(ARMS)
-        assert {len(windows) for windows in arms.values()} == {make_settings("smoke").robustness.num_windows}
-        added = {name: np.unique((windows - arms["coarse"]).round(9)).tolist() for name, windows in arms.items() if name != "real"}
+        assert {len(windows) for windows in arms.values()} == {
+            make_settings("smoke").robustness.num_windows
+        }
+        added = {
+            name: np.unique((windows - arms["coarse"]).round(9)).tolist()
+            for name, windows in arms.items()
+            if name != "real"
+        }
         noise = round(np.random.default_rng(len(f"{purpose}, noise")).random(), 9)
-        assert added == {"coarse": [0], "truth": [0.25], "enhanced": [1_000], "enhanced + GAN": [1_000 + noise], ARM: [2_020]}
+        assert added == {
+            "coarse": [0],
+            "truth": [0.25],
+            "enhanced": [1_000],
+            "enhanced + GAN": [1_000 + noise],
+            ARM: [2_020],
+        }
     purposes = replicate.example.purposes
-    assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == ["train", "train", "train", "calibration"]
+    assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == [
+        "train",
+        "train",
+        "train",
+        "calibration",
+    ]

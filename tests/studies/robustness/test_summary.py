@@ -19,7 +19,9 @@ def test_tables_come_back_as_they_were_written_and_a_missing_one_is_named(tmp_pa
 
 
 def test_the_criterion_allows_twice_the_rate_of_real_training_plus_a_point_and_five_points_less_recall():
-    index = pd.MultiIndex.from_product([["real", "arm"], ["a", "b", "c"]], names=["arm", "detector"])
+    index = pd.MultiIndex.from_product(
+        [["real", "arm"], ["a", "b", "c"]], names=["arm", "detector"]
+    )
     rate = pd.Series([0.01, 0.01, 0.02, 0.03, 0.03, 0.051], index)
     kept = summary.keeps_the_rule(rate, pd.Series([0.5, 0.5, 0.5, 0.451, 0.449, 0.5], index))
     assert kept["arm"].to_dict() == {"a": True, "b": False, "c": False}

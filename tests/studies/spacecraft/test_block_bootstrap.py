@@ -7,7 +7,9 @@ from studies.spacecraft.training_data import BlockBootstrap
 
 @pytest.mark.parametrize(("samples", "block"), [(100, 10), (103, 25), (40, 40), (30, 1)])
 def test_every_block_is_found_in_the_source(samples, block):
-    source = np.arange(20 * samples, dtype=np.float32).reshape(20, samples)  # a value says its window and its place
+    source = np.arange(20 * samples, dtype=np.float32).reshape(
+        20, samples
+    )  # a value says its window and its place
     noise = BlockBootstrap(source, block).generate(50, default_rng(1))
     assert noise.shape == (50, samples) and noise.dtype == np.float32
     for row in noise.astype(int):

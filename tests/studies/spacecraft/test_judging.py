@@ -18,17 +18,32 @@ def channel(sequences, samples=400):
 
 def test_alarms_and_finds_by_hand():
     judge = Judge(channel([(100, 120), (300, 301)]), 16, 8, 0.1)  # a window every second sample
-    first, second = (slice(50 - 7, 60), slice(150 - 7, 151))  # begin from 86 to 118, and from 286 to 300
+    first, second = (
+        slice(50 - 7, 60),
+        slice(150 - 7, 151),
+    )  # begin from 86 to 118, and from 286 to 300
     nominal = len(judge.begins) - 17 - 8
-    assert judge.is_nominal.sum() == nominal and not judge.is_nominal[first].any() and not judge.is_nominal[second].any()
+    assert (
+        judge.is_nominal.sum() == nominal
+        and not judge.is_nominal[first].any()
+        and not judge.is_nominal[second].any()
+    )
     scores = np.zeros(len(judge.begins))
     scores[np.flatnonzero(judge.is_nominal)[: nominal // 20]] = 2.0  # 5 % of the nominal windows
     scores[first], scores[second.start] = 1.0, 3.0
     own, past = np.arange(99) / 66, np.zeros(5)
     found = judge.judge(scores, own, past)
-    assert found["false_alarms"] == pytest.approx(nominal // 20 / nominal)  # the threshold is the 90th of 99 scores, 1.35
-    assert found["false_alarms_past"] == found["false_alarms"]  # five scores support no smaller rate than 1 / 6: their largest, 0
-    assert (found["found_at_0.01"], found["found_at_0.05"], found["found_at_0.1"]) == (1, 2, 2) and found["sequences"] == 2
+    assert found["false_alarms"] == pytest.approx(
+        nominal // 20 / nominal
+    )  # the threshold is the 90th of 99 scores, 1.35
+    assert (
+        found["false_alarms_past"] == found["false_alarms"]
+    )  # five scores support no smaller rate than 1 / 6: their largest, 0
+    assert (found["found_at_0.01"], found["found_at_0.05"], found["found_at_0.1"]) == (
+        1,
+        2,
+        2,
+    ) and found["sequences"] == 2
 
 
 def test_the_areas_of_a_perfect_and_of_a_random_score():
@@ -59,8 +74,14 @@ def discord_by_definition(series, begin, window):
 def test_left_discord_is_the_distance_to_the_nearest_earlier_window_whatever_its_level_and_scale():
     series = np.random.default_rng(0).standard_normal(300)
     begins = np.array([40, 100, 270])
-    np.testing.assert_allclose(left_discord(series, begins, 30), [discord_by_definition(series, begin, 30) for begin in begins], rtol=1e-9)
-    assert left_discord(np.concatenate([series[:20], 5 + 3 * series[:20]]), [20], 20)[0] == pytest.approx(0, abs=1e-6)
+    np.testing.assert_allclose(
+        left_discord(series, begins, 30),
+        [discord_by_definition(series, begin, 30) for begin in begins],
+        rtol=1e-9,
+    )
+    assert left_discord(np.concatenate([series[:20], 5 + 3 * series[:20]]), [20], 20)[
+        0
+    ] == pytest.approx(0, abs=1e-6)
 
 
 def test_left_discord_of_constant_windows_and_of_the_first_window():

@@ -23,7 +23,9 @@ def make(tmp_path):
         for part, number in (("train", 40), ("test", num_test)):
             (tmp_path / part).mkdir(exist_ok=True)
             for channel in ("A-1", "B-2", "C-3", "D-4"):
-                np.save(tmp_path / part / f"{channel}.npy", np.arange(number)[:, None] / [100, 1, 1])
+                np.save(
+                    tmp_path / part / f"{channel}.npy", np.arange(number)[:, None] / [100, 1, 1]
+                )
         (tmp_path / "labeled_anomalies.csv").write_text("\n".join([header, *rows]) + "\n")
         return tmp_path
 
@@ -37,15 +39,22 @@ def test_sequences_that_share_a_sample_are_joined_and_neighbours_are_not(make):
         "C-3": ((0, 100),),
         "D-4": (),
     }
-    assert read_labels(make(['C-3,"[(3, 4)]"', ""], header="\ufeffchan_id,anomaly_sequences")) == {"C-3": ((3, 5),)}
+    assert read_labels(make(['C-3,"[(3, 4)]"', ""], header="\ufeffchan_id,anomaly_sequences")) == {
+        "C-3": ((3, 5),)
+    }
 
 
 def test_channels_by_hand(make):
     folder = make()
     channel = load_channel(folder, "B-2")
-    assert channel.train.values.tolist() == (np.arange(40, dtype=np.float32) / np.float32(100)).tolist()
+    assert (
+        channel.train.values.tolist()
+        == (np.arange(40, dtype=np.float32) / np.float32(100)).tolist()
+    )
     assert (len(channel.test), channel.test.name, channel.test.has_time) == (100, "B-2", False)
-    assert np.flatnonzero(channel.is_anomalous).tolist() == [5, *range(70, 80)], "the file's ends are inside"
+    assert np.flatnonzero(channel.is_anomalous).tolist() == [5, *range(70, 80)], (
+        "the file's ends are inside"
+    )
     np.save(folder / "test" / "C-3.npy", np.arange(60))  # no commands, and shorter than its label
     channel = load_channel(folder, "C-3")
     assert channel.sequences == ((0, 60),) and channel.test.values.tolist() == list(range(60))
@@ -76,7 +85,9 @@ def test_a_bad_folder_is_refused(make, tmp_path, refused):
         load_channel(make(), "Z-9")
     with refused("60 samples", "sample 70 of B-2"):
         load_channel(make(num_test=60), "B-2")
-    np.save(tmp_path / "test" / "B-2.npy", np.where(np.arange(400).reshape(100, 4) == 48, np.inf, 0))
+    np.save(
+        tmp_path / "test" / "B-2.npy", np.where(np.arange(400).reshape(100, 4) == 48, np.inf, 0)
+    )
     with refused("finite", "B-2.npy"):
         load_channel(tmp_path, "B-2")
     (tmp_path / "test" / "B-2.npy").unlink()
