@@ -1,1 +1,3 @@
-"""Speed of enhsim_tf, compared with other implementations and with the limits of the machine: `python -m benchmarks`."""
+"""Speed of enhsim_tf, compared with other implementations and with the limits of the machine:
+`python -m benchmarks`.
+"""

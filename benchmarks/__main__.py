@@ -1,4 +1,6 @@
-"""The command `python -m benchmarks`: runs the benchmarks, prints each row and writes `results.json`."""
+"""The command `python -m benchmarks`: runs the benchmarks, prints each row and writes
+`results.json`.
+"""
 
 import argparse
 import os
@@ -12,7 +14,9 @@ RESULTS = Path(__file__).parent / "results.json"
 
 
 def machine() -> dict:
-    """Returns the processor with its vector instruction sets (on Linux), and the versions of the numerical libraries."""
+    """Returns the processor with its vector instruction sets (on Linux), and the versions of the
+    numerical libraries.
+    """
     cpuinfo = Path("/proc/cpuinfo")
     text = cpuinfo.read_text(encoding="ascii", errors="replace") if cpuinfo.is_file() else ""
     name = re.search(r"^model name\s*: (.*)$", text, re.MULTILINE)
@@ -41,8 +45,9 @@ def main(arguments: list[str] | None = None) -> int:
     """Runs the command."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
-        description="Speed of enhsim_tf, compared with other implementations and with the limits of the machine, in some minutes. "
-        "`python -m book --tables` then takes the results into docs/speed.md.",
+        description="Speed of enhsim_tf, compared with other implementations and with the limits "
+        "of the machine, in some minutes. `python -m book --tables` then takes the results into "
+        "docs/speed.md.",
     )
     parser.add_argument(
         "--out",

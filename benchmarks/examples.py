@@ -1,7 +1,8 @@
-"""What the compared implementations share: data, the GAN's networks, and the timing of an epoch. It imports neither TensorFlow nor ours.
+"""What the compared implementations share: data, the GAN's networks, and the timing of an epoch. It
+imports neither TensorFlow nor ours.
 
-Each implementation must run as its users would run it. If enhsim_tf were imported in the same process, TensorFlow would
-start with the settings of enhsim_tf.
+Each implementation must run as its users would run it. If enhsim_tf were imported in the same
+process, TensorFlow would start with the settings of enhsim_tf.
 """
 
 import os
@@ -24,7 +25,9 @@ WINDOW, HIDDEN_UNITS, FILTERS = 500, 3_200, 500  # of the paper's networks
 
 
 def example_windows(num_windows: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns coarse windows and noisy target windows like those of the paper, float32 of shape `(num_windows, WINDOW)`."""
+    """Returns coarse windows and noisy target windows like those of the paper, float32 of shape
+    `(num_windows, WINDOW)`.
+    """
     rng = np.random.default_rng(0)
     phase = 2 * np.pi * (rng.integers(0, 480, num_windows)[:, None] + np.arange(WINDOW)) / 480
     coarse = 0.5 * np.sign(np.sin(phase)) + 0.25 * np.sign(np.sin(4 * phase))
@@ -56,7 +59,9 @@ def gan_networks(keras: Any, dropout: float = 0.0) -> tuple["keras.Model", "kera
 
 
 def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], float]]:
-    """Returns a callback that times epochs, without the work of `fit` around them, and a function that returns the last epoch's seconds."""
+    """Returns a callback that times epochs, without the work of `fit` around them, and a function
+    that returns the last epoch's seconds.
+    """
     from keras.callbacks import LambdaCallback  # noqa: TID251
 
     times = []
@@ -68,7 +73,9 @@ def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], float]]:
 
 
 def copy(num_bytes: int) -> Work:
-    """Prepares the limit of the machine for training: all cores copy `num_bytes` in total, without allocating memory."""
+    """Prepares the limit of the machine for training: all cores copy `num_bytes` in total, without
+    allocating memory.
+    """
     num_cores = os.cpu_count() or 1
     source, target = (
         np.ones((num_cores, num_bytes // 8 // num_cores), np.float32) for _ in range(2)

@@ -1,4 +1,6 @@
-"""Comparison: plain Keras 3 as in its guides, with `fit` and `predict` on NumPy arrays, and a `tf.function` step for the GAN."""
+"""Comparison: plain Keras 3 as in its guides, with `fit` and `predict` on NumPy arrays, and a
+`tf.function` step for the GAN.
+"""
 
 import keras
 import numpy as np
@@ -41,7 +43,9 @@ def enhancer_step(num_steps: int) -> Work:
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
-    """Prepares GAN iterations by a straightforward `tf.function` with three gradient tapes and the Conv1D layer of Keras."""
+    """Prepares GAN iterations by a straightforward `tf.function` with three gradient tapes and the
+    Conv1D layer of Keras.
+    """
     generator, discriminator = gan_networks(keras, dropout)
     loss = keras.losses.BinaryCrossentropy()
     of_discriminator, of_generator = keras.optimizers.Adam(), keras.optimizers.Adam()

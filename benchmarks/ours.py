@@ -1,4 +1,6 @@
-"""The implementations of enhsim_tf, called as by its users. Each function returns a `Work` (see `benchmarks.examples`)."""
+"""The implementations of enhsim_tf, called as by its users. Each function returns a `Work` (see
+`benchmarks.examples`).
+"""
 
 import os
 import tempfile
@@ -7,6 +9,7 @@ import numpy as np
 
 from benchmarks.examples import HIDDEN_UNITS, WINDOW, Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse.waves import Waves
 from enhsim_tf.common.backend import tf
 from enhsim_tf.datasets.labelled_windows import make_plan, write_windows
 from enhsim_tf.enhancer.model import Enhancer
@@ -15,7 +18,6 @@ from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.paper import noise as of_paper
 from enhsim_tf.paper.enhancer import build_enhancer, enhance, train_enhancer
 from enhsim_tf.paper.settings import make_settings
-from enhsim_tf.simulator.alignment import Waves
 
 
 def enhancer_step(num_steps: int) -> Work:
@@ -33,7 +35,9 @@ def enhancer_step(num_steps: int) -> Work:
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
-    """Prepares iterations of the paper's GAN: two updates of the discriminator on 200 rows and one of the generator, as in the compared code."""
+    """Prepares iterations of the paper's GAN: two updates of the discriminator on 200 rows and one
+    of the generator, as in the compared code.
+    """
     settings = make_settings(
         iterations=num_iterations,
         record_every=num_iterations,
@@ -41,13 +45,14 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
         update="two of 200",
         dropout=dropout,
     )
-    gan = of_paper.NoiseGAN(
-        of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings
-    )
-    gan.compile()
+    networks = of_paper.build_generator(settings), of_paper.build_discriminator(settings)
+    gan = of_paper.connect(*networks, settings)
     noise = np.random.default_rng(0).normal(0, 0.1, (1_500, WINDOW)).astype(np.float32)
     rows = of_paper.Rows(
-        noise, settings.rows_of_each_kind, num_iterations, np.random.default_rng(0)
+        lambda number, rng: noise[rng.integers(0, len(noise), number)],
+        settings.rows_of_each_kind,
+        num_iterations,
+        np.random.default_rng(0),
     )
 
     def run() -> None:
@@ -57,7 +62,9 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
 
 
 def simulator() -> EnhancedSimulator:
-    """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
+    """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not
+    depend on its weights.
+    """
     waves = [
         SquareWave(period_s=480, low=-0.5, high=0.5),
         SquareWave(period_s=120, low=-0.25, high=0.25),
@@ -67,14 +74,15 @@ def simulator() -> EnhancedSimulator:
         NETWORK, WINDOW, 1, 1, np.zeros(1, np.float32), np.zeros(WINDOW, np.float32), layers=layers
     )
     residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, WINDOW, 1)).astype(np.float32)
-    alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, WINDOW)
-    return EnhancedSimulator(
-        alignment, enhancer, WindowBootstrap(residuals), levels=np.array([[0.0, 1.0]])
-    )
+    levels = np.array([[[0.0, 1.0]]])
+    alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, WINDOW, levels=levels)
+    return EnhancedSimulator(alignment, enhancer, WindowBootstrap(residuals))
 
 
 def enhance_and_noise(num_windows: int) -> Work:
-    """Prepares the enhancement of existing coarse windows by the paper's networks and the generation of their noise, in memory."""
+    """Prepares the enhancement of existing coarse windows by the paper's networks and the
+    generation of their noise, in memory.
+    """
     settings = make_settings()
     enhancer, generator = build_enhancer(settings), of_paper.build_generator(settings)
     coarse = example_windows(num_windows)[0]
@@ -105,7 +113,9 @@ def generate_to_parquet(num_windows: int) -> Work:
 
 
 def matrix_product() -> Work:
-    """Prepares the limit of the machine for generation: a large float32 matrix product, in floating-point operations."""
+    """Prepares the limit of the machine for generation: a large float32 matrix product, in
+    floating-point operations.
+    """
     matrix = tf.random.normal((HIDDEN_UNITS, HIDDEN_UNITS), seed=0)
     product = tf.function(lambda: tf.matmul(matrix, matrix)[0, 0])
     return lambda: product().numpy(), 2 * HIDDEN_UNITS**3

@@ -1,7 +1,9 @@
-"""The rows of the benchmark table: the compared implementations, the number of repetitions, and the target for each ratio.
+"""The rows of the benchmark table: the compared implementations, the number of repetitions, and the
+target for each ratio.
 
-The compared implementations alternate, so that a change in the speed of the machine affects all of them. Each ratio is computed
-from two consecutive measurements. The table reports the median and the range of the ratios.
+The compared implementations alternate, so that a change in the speed of the machine affects all of
+them. Each ratio is computed from two consecutive measurements. The table reports the median and the
+range of the ratios.
 """
 
 import subprocess
@@ -14,19 +16,14 @@ import numpy as np
 from benchmarks.worker import Worker
 
 REPETITIONS = 7
-LAYERS = (
-    (500, 500),
-    (500, 3_200),
-    (3_200, 3_200),
-    (3_200, 500),
-)  # inputs and outputs of each layer of the enhancer
+# inputs and outputs of each layer of the enhancer
+LAYERS = ((500, 500), (500, 3_200), (3_200, 3_200), (3_200, 500))
 PARAMETERS = sum(inputs * outputs + outputs for inputs, outputs in LAYERS)
-TRAFFIC = (
-    10 * 4 * PARAMETERS
-)  # bytes of a step: weights are read twice, gradients written once; Adam reads four arrays and writes three
-WINDOW_FLOP = 2 * sum(
-    inputs * outputs for inputs, outputs in LAYERS
-)  # operations of the enhancer for one window
+# bytes of a step: weights are read twice, gradients written once; Adam reads four arrays and writes
+# three
+TRAFFIC = 10 * 4 * PARAMETERS
+# operations of the enhancer for one window
+WINDOW_FLOP = 2 * sum(inputs * outputs for inputs, outputs in LAYERS)
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:
@@ -42,9 +39,8 @@ def in_turns(ways: Mapping[str, Callable[[], float]], repetitions: int) -> dict[
     """Calls the functions alternately, and returns the results of each."""
     found = {name: [] for name in ways}
     for repetition in range(repetitions):
-        for name in list(ways)[
-            :: 1 if repetition % 2 else -1
-        ]:  # reverses the order each time, so that none always follows the same other
+        # reverses the order each time, so that none always follows the same other
+        for name in list(ways)[:: 1 if repetition % 2 else -1]:
             found[name].append(ways[name]())
     return found
 
@@ -57,7 +53,9 @@ def compared(
     unit: str = "ms",
     target: float | None = None,
 ) -> dict:
-    """Returns a row from seconds of ours and of a comparison, one for each repetition, and a target for the median ratio, if there is one."""
+    """Returns a row from seconds of ours and of a comparison, one for each repetition, and a target
+    for the median ratio, if there is one.
+    """
     factor = {"ms": 1e3, "s": 1.0}[unit]
     return {
         "work": work,

@@ -1,7 +1,9 @@
-"""Comparison: the textbook GAN loop, with one call of `predict` and three calls of `train_on_batch` in each iteration.
+"""Comparison: the textbook GAN loop, with one call of `predict` and three calls of `train_on_batch`
+in each iteration.
 
-The loop needs legacy Keras. In Keras 3, setting `trainable = False` before compiling the combined model freezes the
-discriminator permanently, so the loop would be fast but wrong. Before the timing, a check ensures that the discriminator learns.
+The loop needs legacy Keras. In Keras 3, setting `trainable = False` before compiling the combined
+model freezes the discriminator permanently, so the loop would be fast but wrong. Before the timing,
+a check ensures that the discriminator learns.
 """
 
 import numpy as np
@@ -11,7 +13,9 @@ from benchmarks.examples import WINDOW, Work, gan_networks
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0) -> Work:
-    """Prepares iterations with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
+    """Prepares iterations with 200 real and 200 generated rows for the discriminator and 200 for
+    the generator.
+    """
     generator, discriminator = gan_networks(keras, dropout)
     discriminator.compile(loss="binary_crossentropy", optimizer="adam", metrics=["accuracy"])
     discriminator.trainable = False

@@ -1,4 +1,6 @@
-"""Comparison: the enhancer in PyTorch with its fused Adam. It needs `pip install -e ".[benchmarks]"`."""
+"""Comparison: the enhancer in PyTorch with its fused Adam. It needs `pip install -e
+".[benchmarks]"`.
+"""
 
 import numpy as np
 import torch

@@ -1,8 +1,8 @@
 """Runs one implementation in a separate process, and times it on request.
 
-In `python -m benchmarks.worker MODULE FUNCTION JSON`, the function receives the settings and returns a `Work`. Each line on
-standard input requests a repetition, and each answer is a line of JSON. The separate process gives each implementation its
-own libraries and threads.
+In `python -m benchmarks.worker MODULE FUNCTION JSON`, the function receives the settings and
+returns a `Work`. Each line on standard input requests a repetition, and each answer is a line of
+JSON. The separate process gives each implementation its own libraries and threads.
 """
 
 import importlib
@@ -48,7 +48,8 @@ class Worker:
         line = self._process.stdout.readline()
         if not line:
             raise RuntimeError(
-                f"Expected an answer. Received: none from {' '.join(self._process.args[2:])}. Run that command by hand."
+                f"Expected an answer. Received: none from {' '.join(self._process.args[2:])}. Run "
+                "that command by hand."
             )
         return json.loads(line)
 
@@ -69,9 +70,8 @@ def main(module: str, function: str, settings: str) -> None:
     for _ in sys.stdin:
         began = time.perf_counter()
         timed = run()
-        seconds = (
-            timed if isinstance(timed, float) else time.perf_counter() - began
-        )  # some works measure their own time
+        # some works measure their own time
+        seconds = timed if isinstance(timed, float) else time.perf_counter() - began
         answers.write(json.dumps({"seconds": seconds / units}) + "\n")
 
 

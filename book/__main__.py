@@ -1,4 +1,6 @@
-"""The command `python -m book`: builds the book as HTML, or refreshes the marked tables of the pages."""
+"""The command `python -m book`: builds the book as HTML, or refreshes the marked tables of the
+pages or the data of the playground.
+"""
 
 import argparse
 import importlib.util
@@ -7,19 +9,28 @@ import sys
 import tempfile
 from pathlib import Path
 
+from enhsim_tf.common.console import run_command
+
 ROOT = Path(__file__).parents[1]
+PLAYGROUND = ROOT / "book" / "playground"
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command.
 
     Returns:
-        The exit code: 0, 1 if Sphinx warned, or 2 if its packages are not installed.
+        The exit code: 0, 1 if Sphinx warned, or 2 if its packages are not installed or an argument
+        cannot be used.
     """
+    return run_command(lambda: run(arguments), "interrupted; nothing was written")
+
+
+def run(arguments: list[str] | None) -> int:
+    """Parses the command line and runs the command."""
     parser = argparse.ArgumentParser(
         prog="python -m book",
-        description="Builds the book from the notebooks (with their stored outputs), the pages and the docstrings. "
-        'It needs `python -m pip install ".[book]"` and no network.',
+        description="Builds the book from the notebooks (with their stored outputs), the pages and "
+        'the docstrings. It needs `python -m pip install ".[book]"` and no network.',
     )
     parser.add_argument(
         "--out",
@@ -32,11 +43,30 @@ def main(arguments: list[str] | None = None) -> int:
         action="store_true",
         help="refresh the marked tables of README.md and docs/, and build nothing",
     )
+    parser.add_argument(
+        "--playground",
+        action="store_true",
+        help="write the data of book/playground from the paper's pipeline, and build nothing",
+    )
+    parser.add_argument(
+        "--summary",
+        type=Path,
+        metavar="RESULTS",
+        help="print the verdicts of a run's results.json as Markdown, and build nothing",
+    )
     options = parser.parse_args(arguments)
+    if options.summary:
+        from book.tables import summary
+
+        print(summary(options.summary))
+        return 0
     if options.tables:
         from book.tables import refresh
 
         print(*refresh(ROOT), sep="\n")
+        return 0
+    if options.playground:
+        print(write_playground())
         return 0
     missing = [
         name
@@ -45,7 +75,8 @@ def main(arguments: list[str] | None = None) -> int:
     ]
     if missing:
         print(
-            f'Expected the packages of the book. Missing: {", ".join(missing)}. Run `python -m pip install ".[book]"`.',
+            f"Expected the packages of the book. Missing: {', '.join(missing)}. "
+            'Run `python -m pip install ".[book]"`.',
             file=sys.stderr,
         )
         return 2
@@ -53,7 +84,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def build(out: Path) -> int:
-    """Builds the book from the start, because Sphinx does not repeat the warnings of pages that it keeps."""
+    """Builds the book from the start, because Sphinx does not repeat the warnings of pages that it
+    keeps.
+    """
     from sphinx.cmd.build import main as sphinx
 
     if (out / "objects.inv").is_file():  # an earlier book, of which no page may stay behind
@@ -74,8 +107,24 @@ def build(out: Path) -> int:
                 str(out),
             ]
         )
+    shutil.copytree(PLAYGROUND, out / "playground", dirs_exist_ok=True)
     print(out / "index.html")
     return code
+
+
+def write_playground() -> Path:
+    """Writes the data of the playground, for which it trains the paper's networks unless the cache
+    has them.
+    """
+    from book.playground_data import write  # with the networks, TensorFlow
+    from enhsim_tf.common.console import tell
+    from enhsim_tf.common.stages import Stages, default_cache
+    from enhsim_tf.paper.pipeline import Pipeline
+    from enhsim_tf.paper.settings import make_settings
+
+    path = PLAYGROUND / "data.js"
+    write(Pipeline(make_settings(), Stages(default_cache(), tell=tell, speaks=True)), path)
+    return path
 
 
 if __name__ == "__main__":

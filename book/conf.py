@@ -1,4 +1,6 @@
-"""Settings of Sphinx. The sources are all of the repository, so that a link means the same in the book and on a code host."""
+"""Settings of Sphinx. The sources are all of the repository, so that a link means the same in the
+book and on a code host.
+"""
 
 import sys
 from pathlib import Path
@@ -32,9 +34,8 @@ include_patterns = ["*.md", "book/**", "docs/*.md", "notebooks/*.ipynb", "studie
 external_toc_path = str(ROOT / "book" / "_toc.yml")
 suppress_warnings = ["etoc.toctree"]  # the toctrees of autosummary are beside the table of contents
 
-nb_execution_mode = (
-    "off"  # the stored outputs are those of the full budget; `python -m notebooks.build` makes them
-)
+# the stored outputs are those of the full budget; `python -m notebooks.build` makes them
+nb_execution_mode = "off"
 nb_ipywidgets_js: dict[str, dict] = {}  # the default loads two scripts from the network
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
@@ -66,7 +67,9 @@ html_theme_options = {
 
 
 def setup(app: "Sphinx") -> None:
-    """Renders formulas as MathML, which browsers show without a script, and so without a network."""
+    """Renders formulas as MathML, which browsers show without a script, and so without a
+    network.
+    """
     from docutils.nodes import SkipNode
 
     def visit(as_block: bool):  # noqa: ANN202

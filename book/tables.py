@@ -1,9 +1,10 @@
-"""The marked tables of the README and of the pages in `docs/`, written from the files that commands wrote: `python -m book --tables`.
+"""The marked tables of the README and of the pages in `docs/`, written from the files that commands
+wrote: `python -m book --tables`.
 
-A marked table stands between `<!-- NAME: generated -->` and `<!-- end of NAME -->`. The sentences around it are written by hand.
+A marked table stands between `<!-- NAME: generated -->` and `<!-- end of NAME -->`. The sentences
+around it are written by hand.
 """
 
-import itertools
 import json
 import math
 import re
@@ -37,7 +38,9 @@ def refresh(root: Path) -> list[Path]:
 
 
 def stale(root: Path) -> Iterator[str]:
-    """Yields the name and page of each table that differs from what `refresh` would write by more than `TOLERANCE`."""
+    """Yields the name and page of each table that differs from what `refresh` would write by more
+    than `TOLERANCE`.
+    """
     for name, (page, table) in TABLES.items():
         text = (root / page).read_text(encoding="utf-8")
         if not agree(text, fill_part(text, name, table(root), page)):
@@ -68,7 +71,7 @@ def fill_part(text: str, name: str, content: str, where: str) -> str:
 
 
 def verdicts(root: Path) -> str:
-    """The claims of the README, each with its published verdict and the verdicts of the runs."""
+    """The claims of the README, each with its published verdict."""
     published = json.loads(
         (root / "enhsim_tf" / "paper" / "published.json").read_text(encoding="utf-8")
     )["claims"]
@@ -78,36 +81,103 @@ def verdicts(root: Path) -> str:
             "claims"
         ]
     }
-    rows = []
-    for id, each in published.items():
-        rows.append((f"{id} {short[id]}", each["verdict"], "/".join(map(str, each["runs"]))))
-    return markdown(("claim", "verdict", f"reproduced/partly/not, {sum(each['runs'])} runs"), rows)
+    rows = [
+        (
+            f"{id} {short[id]}",
+            each["verdict"] + (f" ({each['decided_by']})" if each["decided_by"] else ""),
+        )
+        for id, each in published.items()
+    ]
+    return markdown(["claim", "verdict"], rows)
+
+
+def summary(path: Path) -> str:
+    """The verdicts of one run as Markdown, for the summary of a job.
+
+    Args:
+        path: The `results.json` of `python -m enhsim_tf.reproduce`.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        rows = [list(row.values()) for row in found["box"]]
+        header = list(found["box"][0])
+        about = f"{found['budget']} budget, seed {found['seed']}, {found['seconds']:.0f} s"
+    except (OSError, ValueError, KeyError, IndexError) as error:
+        raise InputError(
+            f"Expected the results.json of a whole reproduction. Received: {path} ({error})."
+        ) from error
+    return f"## {found['title']} The reproduction: {about}\n\n{markdown(header, rows)}"
 
 
 def measurements(root: Path) -> str:
-    """What each limit of the claims asks for, and what the reference measured over seeds and roundings."""
-    from enhsim_tf.paper.claims import CLAIMS, OURS, WHOLE  # with the networks, TensorFlow
+    """What each limit of the claims asks for, and what the deciding readings measured over seeds
+    and roundings. A limit that holds in all runs of all readings at a tenth of its distance is
+    marked.
+    """
+    from enhsim_tf.paper.claims import CLAIMS, SHOWN, WHOLE, Limit  # with the networks, TensorFlow
     from enhsim_tf.paper.report import needed, short
+    from studies.readings.run import DECIDING
+    from studies.readings.summary import measurements
 
-    table = _table_of_readings(root)
-    reference = table[table["reading"] == "reference"]
-    rows, words = [], {OURS: "({})", WHOLE: "{} for *reproduced*"}
+    table, rows = _table_of_readings(root), []
+    words = {SHOWN: "({})", WHOLE: "{} for *reproduced*"}
+    columns = [name for name in DECIDING if name in set(table["reading"])]
     for claim in CLAIMS:
-        runs = reference[reference["claim"] == claim.id].pivot(
-            index=["rounding", "seed"], columns="name", values="value"
-        )
-        for name, group in itertools.groupby(claim.limits, lambda limit: limit.name):
-            limits, values, asked, kept = list(group), runs[name], [], []
+        runs = measurements(table, claim.id)
+        of_name: dict[str, list[Limit]] = {}
+        for limit in claim.limits:
+            of_name.setdefault(limit.name, []).append(limit)
+        for name, limits in of_name.items():
+            known = runs.reindex(columns={name, *runs}).dropna(subset=[name])
+            asked = []
             for limit in limits:
-                ends = {"low": limit.low, "high": limit.upper(runs.median())}
-                range_words = needed(
-                    {end: None if math.isinf(value) else value for end, value in ends.items()}
+                ends = dict(zip(("low", "high"), limit.ends(known.median()), strict=True))
+                asked_for = needed(
+                    {end: value if math.isfinite(value) else None for end, value in ends.items()}
                 )
-                asked.append(words.get(limit.decides, "{}").format(range_words))
-                kept.append(str(sum(map(limit.holds, runs.to_dict("records")))))
-            found = f"{short(values.median())} ({short(values.min())} to {short(values.max())})"
-            rows.append((claim.id, limits[0].words, found, ", ".join(asked), ", ".join(kept)))
-    return markdown(("claim", "measured", "median (range)", "needed", "runs that hold"), rows)
+                is_met = [limit.holds(run, 0.1) for run in known.to_dict("records")]
+                mark = "¹" if is_met and all(is_met) else ""
+                asked.append(words.get(limit.decides, "{}").format(asked_for) + mark)
+            row = [claim.id, limits[0].words, ", ".join(asked)]
+            for column in columns:
+                part = known[known.index.get_level_values("reading") == column]
+                low, middle, high = map(short, part[name].quantile([0, 0.5, 1]))
+                held = [sum(map(limit.holds, part.to_dict("records"))) for limit in limits]
+                spread = f" ({low}–{high})" if len(part) > 1 else ""
+                told = f"{middle}{spread}; {', '.join(map(str, held))}"
+                row.append(told if len(part) else "")
+            rows.append(row)
+    header = ["claim", "measured", "needed"]
+    for column in columns:
+        number = len(table.loc[table["reading"] == column, ["rounding", "seed"]].drop_duplicates())
+        header.append(f"{column}: median (range); limits hold, of {number}")
+    return markdown(header, rows)
+
+
+def signs(root: Path) -> str:
+    """The title with each statistic of C6, in both columns and at three factors of all limits."""
+    from studies.readings.summary import signs  # with the networks, TensorFlow
+
+    return markdown(*signs(_table_of_readings(root)))
+
+
+def effects(root: Path) -> str:
+    """The effects of the factorial."""
+    from studies.readings.summary import effects  # with the networks, TensorFlow
+
+    return markdown(*effects(_table_of_readings(root)))
+
+
+def author_code(root: Path) -> str:
+    """The author's code beside the networks of this project in his configuration."""
+    import pandas as pd
+
+    from studies.author_code.summary import beside
+
+    his = root / "studies" / "author_code" / "results" / "measurements.parquet"
+    if not his.is_file():
+        return "No run has finished yet."
+    return markdown(*beside(pd.read_parquet(his), _table_of_readings(root)))
 
 
 def readings(root: Path) -> str:
@@ -124,27 +194,25 @@ def _table_of_readings(root: Path) -> "pd.DataFrame":
 
 
 def settings_table(root: Path) -> str:
-    """The table of decisions: each setting, the paper's and the author's value, and where the value comes from."""
+    """The table of decisions: each setting, the paper's and the author's value, and why this value.
+    The page says where the author's code is, and that reasons without a source are ours.
+    """
     from enhsim_tf.paper.report import decisions  # with the networks, TensorFlow
+    from enhsim_tf.paper.settings import GAN_CODE, MLP_CODE, PAPER
 
-    rows = [
-        (
-            f"`{row['setting']}`",
-            row["value"],
-            row["paper"],
-            row["author"],
-            ": ".join(filter(None, (row["source"], row["why"]))),
-        )
-        for row in decisions()
-    ]
-    return markdown(("setting", "here", "paper", "author's code", "source: reason"), rows)
+    rows = []
+    for row in decisions():
+        why = f"paper, {row['why']}" if row["source"] == PAPER else row["why"]
+        why = why.replace(f"{GAN_CODE} and {MLP_CODE}", "code")
+        why = why.replace(GAN_CODE, "code").replace(MLP_CODE, "code")
+        rows.append((f"`{row['setting']}`", row["value"], row["paper"], row["author"], why))
+    return markdown(("setting", "here", "paper", "code", "why"), rows)
 
 
 def speed(root: Path) -> str:
-    """The table of the benchmarks."""
-    return speed_table(
-        json.loads((root / "benchmarks" / "results.json").read_text(encoding="utf-8"))["rows"]
-    )
+    """The table of the benchmarks, without the times of imports."""
+    rows = json.loads((root / "benchmarks" / "results.json").read_text(encoding="utf-8"))["rows"]
+    return speed_table([row for row in rows if row["comparison"] != "import tensorflow"])
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -157,7 +225,10 @@ def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 TABLES: dict[str, tuple[str, Callable[[Path], str]]] = {
     "verdicts": ("README.md", verdicts),
     "measurements": ("docs/report.md", measurements),
+    "signs": ("docs/report.md", signs),
     "readings": ("studies/readings/README.md", readings),
+    "effects": ("studies/readings/README.md", effects),
+    "author_code": ("studies/author_code/README.md", author_code),
     "settings": ("docs/decisions.md", settings_table),
     "speed": ("docs/speed.md", speed),
 }

@@ -1,4 +1,5 @@
-"""ML-enhanced simulation: realistic telemetry from a coarse simulator (Feldman 2020, arXiv 2008.12082).
+"""ML-enhanced simulation: realistic telemetry from a coarse simulator (Feldman 2020, arXiv
+2008.12082).
 
 The public names below are imported on first use, so `import enhsim_tf` takes milliseconds and only
 modules that use a network import TensorFlow.
@@ -6,39 +7,41 @@ modules that use a network import TensorFlow.
 
 import importlib
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PLACES = {
     "Cleaned": "telemetry.cleaning.clean",
     "Cleaning": "telemetry.cleaning.clean",
-    "CoarseSimulator": "coarse_simulator.interface",
-    "Degraded": "coarse_simulator.degraded",
+    "Clock": "telemetry.series",
+    "CoarseSimulator": "coarse.interface",
+    "Degraded": "coarse.degraded",
     "EnhancedSimulator": "simulator.simulator",
-    "FitOptions": "simulator.options",
-    "FmuSimulator": "coarse_simulator.fmu",
-    "FunctionSimulator": "coarse_simulator.interface",
-    "InjectOptions": "datasets.places",
+    "FitOptions": "fitting.options",
+    "FmuSimulator": "coarse.fmu",
+    "FunctionSimulator": "coarse.interface",
+    "InjectOptions": "datasets.options",
     "InputError": "common.errors",
-    "Recording": "coarse_simulator.recording",
-    "ScoreOptions": "simulator.options",
-    "Scorer": "simulator.scoring",
-    "SquareWave": "coarse_simulator.square_waves",
-    "SquareWaveSimulator": "coarse_simulator.square_waves",
     "Telemetry": "telemetry.series",
-    "TelemetryDetector": "simulator.estimator",
-    "TrustedRange": "simulator.trusted_range",
+    "ScoreOptions": "scoring.options",
+    "Scorer": "scoring.scorer",
+    "SquareWave": "coarse.square_waves",
+    "SquareWaveSimulator": "coarse.square_waves",
+    "TelemetryDetector": "scoring.estimator",
+    "TrustedRange": "scoring.trusted_range",
     "clean": "telemetry.cleaning.clean",
-    "events_table": "simulator.scoring",
-    "fit": "simulator.fitting",
+    "events_table": "scoring.score",
+    "example": "datasets.example",
+    "fit": "fitting.fit",
     "inject": "datasets.inject",
-    "join_channels": "simulator.joint",
-    "read_recording": "coarse_simulator.recording_files",
+    "join_channels": "telemetry.joining",
+    "read_recording": "coarse.recording_files",
     "read_source": "telemetry.sources",
-    "record": "coarse_simulator.recording",
-    "score": "simulator.scoring",
+    "read_telemetry": "telemetry.sources",
+    "record": "coarse.interface",
+    "score": "scoring.score",
     "series_labelled": "datasets.labelled_series",
     "to_series": "telemetry.pandas_series",
-    "update": "simulator.updating",
+    "update": "fitting.update",
 }
 __all__ = list(_PLACES)
 

@@ -1,4 +1,6 @@
-"""The paper's pipeline with a server of one's own: `python -m enhsim_tf.reproduce --store influxdb`."""
+"""The paper's pipeline with a server of one's own: `python -m enhsim_tf.reproduce --store
+influxdb`.
+"""
 
 import dataclasses
 import zlib
@@ -19,7 +21,8 @@ class InfluxTelemetry:
     def __init__(self, place: str):
         if place != "influxdb" and not place.startswith("influxdb://"):
             raise InputError(
-                f"Expected --store parquet, influxdb or influxdb://bucket/measurement/field. Received: --store {place}."
+                "Expected --store parquet, influxdb or influxdb://bucket/measurement/field. "
+                f"Received: --store {place}."
             )
         self.location = parse_location(
             "influxdb://telemetry/enhsim_tf/value" if place == "influxdb" else place
@@ -27,8 +30,11 @@ class InfluxTelemetry:
         InfluxStore(self.location).check()
 
     def write(self, telemetry: "Telemetry") -> None:
-        """Places a series, with a tag that is the checksum of its content, so that other series at the place stay apart."""
-        self.written, self.times = telemetry, telemetry.stamps.as_unit("ns").asi8
+        """Places a series, with a tag that is the checksum of its content, so that other series at
+        the place stay apart.
+        """
+        self.written = telemetry
+        self.times = telemetry.stamps.as_unit("ns").asi8
         content = f"{zlib.crc32(self.times.tobytes() + telemetry.values.tobytes()):08x}"
         self.store = InfluxStore(
             dataclasses.replace(self.location, tags=(*self.location.tags, ("run", content)))
@@ -40,7 +46,8 @@ class InfluxTelemetry:
         times, values = self.store.read()
         if not np.array_equal(times, self.times):
             raise InputError(
-                f"Expected the {len(self.times):,} samples that were written to {self.location}. Received: {len(times):,}, or other times. "
+                f"Expected the {len(self.times):,} samples that were written to {self.location}. "
+                f"Received: {len(times):,}, or other times. "
                 "Run the command again, or give another --store."
             )
         return dataclasses.replace(self.written, values=values.astype(np.float32))

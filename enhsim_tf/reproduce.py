@@ -1,4 +1,6 @@
-"""The command: runs the pipeline of the paper, draws its figures, and gives a verdict on each of its claims."""
+"""The command: runs the pipeline of the paper, draws its figures, and gives a verdict on each of
+its claims.
+"""
 
 import argparse
 import sys
@@ -6,7 +8,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, write_json
+from enhsim_tf.common.atomic_files import (
+    make_folder,
+    remove_leftovers,
+    removing_empty,
+    write_json,
+)
 from enhsim_tf.common.console import Parser, run_command, tell
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.common.stages import Stages, default_cache
@@ -20,24 +27,24 @@ examples:
   {PROGRAM}                            everything at full budget, in minutes
   {PROGRAM} --budget smoke             every step with small counts, written to smoke/
   {PROGRAM} --only fig04               one figure and the stages that it needs
-  {PROGRAM} --set dropout=0            another reading of the paper; the decisions page lists all settings
+  {PROGRAM} --set dropout=0            another reading; the decisions page lists all settings
   {PROGRAM} --telemetry my.csv --column volts --time utc --out my_figures
   {PROGRAM} --store influxdb           with the server given by INFLUXDB_V2_URL, _TOKEN and _ORG
 
-further experiments are studies with commands of their own: python -m studies.robustness, and others in studies/
+further experiments are studies with commands of their own: python -m studies.robustness and others
 
-exit code: 0 every measurement with a limit lies within its published range, 1 one does not, 2 an input or option cannot be used
+exit code: 0 every measurement with a limit lies within its published range, 1 one does not,
+2 an input or option cannot be used
 """
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """Reads the command line without slow imports."""
-    form = argparse.RawDescriptionHelpFormatter
     parser = Parser(
         prog=PROGRAM,
         description="Reproduces Feldman 2020, end to end.",
         epilog=EXAMPLES,
-        formatter_class=form,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "--budget",
@@ -53,10 +60,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         metavar="NAME=VALUE",
         help="changes a setting; may be repeated",
     )
-    figures = [f"fig{number:02}" for number in range(1, 15)]
     parser.add_argument(
         "--only",
-        choices=figures,
+        choices=[f"fig{number:02}" for number in range(1, 15)],
         metavar="FIGURE",
         help="draws one figure, for example fig04, and evaluates no claim",
     )
@@ -97,25 +103,32 @@ def read_settings(options: argparse.Namespace) -> "Settings":
     pairs = [text.partition("=") for text in options.set]
     if wrong := [name for name, equals, value in pairs if not (equals and value)]:
         raise InputError(f"Expected --set NAME=VALUE. Received: --set {wrong[0]}.")
+    if named := {"seed", "budget"}.intersection(name for name, *_ in pairs):
+        raise InputError(f"Expected --{min(named)}. Received: --set {min(named)}. Give the option.")
     return make_settings(
         options.budget, seed=options.seed, **{name: value for name, _, value in pairs}
     )
 
 
 def choose_folder(options: argparse.Namespace) -> Path:
-    """The output folder. Only a run of the reference on the example writes to `figures` of its own accord."""
+    """The output folder. Only a run of the reference on the example with seed 0 writes to `figures`
+    of its own accord.
+    """
     default = "smoke" if options.budget == "smoke" else "figures"
     if options.telemetry is not None:
         default = f"{default}_{options.telemetry.stem}"
     elif options.set:
         default = f"{default}_changed"
+    elif options.seed:
+        default = f"{default}_seed{options.seed}"
     if (
         options.out is not None
         and options.budget == "smoke"
         and options.out.resolve() == Path("figures").resolve()
     ):
         raise InputError(
-            "Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures."
+            "Expected another --out for a smoke run: figures/ holds full budget. Received: --out "
+            "figures."
         )
     return options.out or Path(default)
 
@@ -127,13 +140,15 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             "Expected --column and --time together with --telemetry. Received: one of them alone."
         )
-    settings, folder = read_settings(options), choose_folder(options)
+    settings = read_settings(options)
+    folder = choose_folder(options)
     store = None
     if options.store != "parquet":
         from enhsim_tf.own_store import InfluxTelemetry
 
         store = InfluxTelemetry(options.store)
-    folder, cache = make_folder(folder), make_folder(options.cache or default_cache())
+    make_folder(folder)
+    cache = make_folder(options.cache or default_cache())
     remove_leftovers(folder)
 
     # the seconds of TensorFlow begin here, after all cheap checks
@@ -157,27 +172,38 @@ def run(options: argparse.Namespace) -> int:
     if options.only:
         return 0
 
-    records, published = judge_all(pipeline), read_published()
+    records = judge_all(pipeline)
+    published = read_published()
     about = {
         "budget": options.budget,
         "seconds": time.perf_counter() - began,
         "stages": stages.seconds,
         "from_cache": [name for name, kept in stages.cached.items() if kept],
     }
-    found = results(records, title(records), settings, published, **about)
+    found = results(
+        records,
+        title([record["verdict"] for record in records if record["is_tested"]]),
+        settings,
+        published,
+        **about,
+    )
     write_json(folder / "results.json", found)
     tell(f"\n{as_text(found['box'])}\n")
     tell(
-        f"published {published['title']} (in brackets: runs reproduced/partly/not)   this run {found['title']}   {about['seconds']:.0f} s"
+        f"published {published['title']} (in brackets: runs reproduced/partly/not)   this run "
+        f"{found['title']}   {about['seconds']:.0f} s"
     )
     tell(
-        f"figures, results.json and the whole run on one page: {write_page(folder, found, settings)}"
+        "figures, results.json and the whole run on one page: "
+        f"{write_page(folder, found, settings)}"
     )
     return conclude(options, outside(records, published))
 
 
 def foot_of(options: argparse.Namespace, figure: str) -> str:
-    """The foot of a figure: what this run differs in from others, and the command for this figure."""
+    """The foot of a figure: what this run differs in from others, and the command for this
+    figure.
+    """
     source = [] if options.telemetry is None else [options.telemetry.name]
     store = [] if options.store == "parquet" else [f"store {options.store}"]
     about = [
@@ -195,7 +221,8 @@ def conclude(options: argparse.Namespace, different: list[str]) -> int:
     """Tells how the measurements compare with the published ranges, and returns the exit code."""
     if options.budget == "smoke" or options.telemetry or options.set:
         tell(
-            "Published verdicts are those of the reference on the paper's example at full budget; this run is another one."
+            "Published verdicts are those of the reference on the paper's example at full budget; "
+            "this run is another one."
         )
         return 0
     for line in different:
@@ -205,9 +232,14 @@ def conclude(options: argparse.Namespace, different: list[str]) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command. An error of the user is reported as one line, with exit code 2."""
+
+    def run_parsed() -> int:
+        options = parse(arguments)
+        with removing_empty(choose_folder(options), options.cache):
+            return run(options)
+
     return run_command(
-        lambda: run(parse(arguments)),
-        "interrupted; finished stages are kept, and the next run continues after them",
+        run_parsed, "interrupted; finished stages are kept, and the next run continues after them"
     )
 
 

@@ -1,5 +1,5 @@
 # %% [markdown]
-# # The whole idea in ten minutes
+# # The whole idea in a quarter of an hour
 #
 # **Question:** can data from a crude simulator, made realistic by two neural networks, train a detector?
 #
@@ -40,7 +40,7 @@ show(pipeline, "fig01_pipeline")
 
 # %% [markdown]
 # *What to see:* waveform and noise meet only in their sum. A healthy and a stuck satellite therefore get the same noise from the same
-# random numbers ([01](01_pipeline.ipynb)):
+# random numbers:
 
 # %%
 added = {}
@@ -136,14 +136,14 @@ num_records = pipeline.settings.iterations // pipeline.settings.record_every
 history = {key: values[:num_records] for key, values in pipeline.history.items() if values.ndim}
 
 # %% [markdown]
-# *What to see:* the two accuracies swing in opposite directions. After the first record (one every 100 iterations) the losses
-# ([binary cross-entropy](../docs/glossary.md#adversarial-loss)) stay near ln 2, which guessing gives, and the discriminator is right about
-# half of the time. Here the paper stops: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
+# *What to see:* the two accuracies swing in opposite directions. The losses ([binary cross-entropy](../docs/glossary.md#adversarial-loss))
+# stay near ln 2, which guessing gives, in all records (one every 100 iterations), and on average the discriminator is right about half of
+# the time. Here the paper stops: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
 
 # %%
 late = np.mean([history[f"accuracy_{kind}"][-3:] for kind in ("real", "generated")])
 say(f"Classified correctly over the last three records: **{late:.0%}** of both kinds together.")
-assert 0.35 < late < 0.65
+assert budget == "smoke" or 0.35 < late < 0.65
 if budget == "full":
     losses = np.array([history["loss_real"], history["loss_generated"]])
     assert np.corrcoef(history["accuracy_real"], history["accuracy_generated"])[0, 1] < -0.5
@@ -186,6 +186,7 @@ assert ranks["generated"] < {"full": 0.2, "smoke": 0.6}[budget] * ranks["real"]
 # %%
 clean = pipeline.enhancer.predict(test["coarse"], verbose=0)
 latent = np.random.default_rng(0).standard_normal((len(clean), 16), "float32")
+latent *= pipeline.settings.latent_scale  # their standard deviation
 noise = pipeline.generator.predict(latent, verbose=0)[:, :, 0]
 combined = clean + noise
 show(pipeline, "fig13_combined")
@@ -268,13 +269,14 @@ rates, recall = (
 )
 with_gan = rates["enhanced + GAN noise"]
 too_many = int((with_gan > 0.1).sum())
-title = f"With GAN noise, {too_many} of {len(rates)} detectors exceed 10 % false alarms"
+title = f"With GAN noise, {too_many} of {len(rates)} detectors above 10 % false alarms"
 show_detectors(rates, recall, title)
 
 # %% [markdown]
 # *What to see:* the dotted line marks the 1 % of the thresholds. Trained on the clean enhanced signal, every detector alarms on nearly
-# every nominal window. After the GAN's noise, it depends on the detector. After square waves, the PCA residual and the forest alarm seldom
-# and find fewer faults than after real data. A detector that always alarms finds everything.
+# every nominal window. After the GAN's noise, the PCA residual still does, and the forest finds fewer faults than after real data. After
+# square waves, the PCA residual and the forest alarm seldom and find fewer faults than after real data. A detector that always alarms finds
+# everything.
 
 # %%
 say("False alarms after GAN noise: " + ", ".join(f"{name} **{a:.0%}**" for name, a in with_gan.items()) + ".")
@@ -293,25 +295,30 @@ if budget == "full":  # noise of the wrong size would teach a detector nothing
 # %%
 claim("C6", "C8", "C9")
 records = verdict(pipeline, "C6", "C8", "C9", limits=False)
-share, decides = records[2]["measured"]["share_of_modes"], records[0]["deciding"]["name"]
-lag, real_lag, error = (records[0]["measured"][name] for name in ("lag_one", "real_lag_one", "lag_one_error"))
+noise, errors = records[0]["measured"], records[2]["measured"]
 say(
-    f"Correlation of neighbouring samples, which decides C6: **{lag:.3f}** generated, **{real_lag:.3f}** real. The error may be at most "
-    f"half of the real noise's distance from zero; it is **{error:.1f}** times that distance."
+    f"A classifier that tells generated from real noise has an AUC of **{noise['auc']:.3f}**; between real and real noise, "
+    f"{noise['floor_auc']:.3f}. C6 allows a difference of 0.2."
 )
-say(f"Six faults are tried; the enhanced signal of **{6 * share:.0f}** has at most twice the nominal error.")
-assert budget == "smoke" or decides == "lag_one_error"
+nominal = errors["nrmse, nominal"]
+of_faults = [
+    error for name, error in errors.items() if name.startswith("nrmse, ") and name != "nrmse, nominal"
+]
+num_good = sum(error <= 2 * nominal for error in of_faults)
+say(f"Six faults are tried; the enhanced signal of **{num_good}** has at most twice the nominal error.")
+assert budget == "smoke" or records[0]["deciding"]["name"] == "auc_over_floor"
 
 # %% [markdown]
 # | stage | where it fails |
 # |---|---|
 # | enhancer | one matrix does better; most faults have more than twice the nominal error (C9) |
 # | moving average | a little of the waveform stays in the noise (notebook 08) |
-# | noise GAN | the correlation of neighbouring samples misses its limit (C6); few dimensions, although the networks are in balance |
-# | sum | the PCA residual and the autoencoder alarm on nominal telemetry (C8) |
+# | noise GAN | a classifier tells its noise from real noise (C6); few dimensions, although the networks are in balance |
+# | sum | the PCA residual alarms on nominal telemetry, and the isolation forest finds fewer faults (C8) |
 #
-# **Answer.** Not as it stands: the signal is nearly right, but two of three detectors alarm far too often on nominal telemetry.
-# The tool of this project, `python -m enhsim_tf fit`, chooses among noise models instead ([noise](../docs/noise.md)).
+# **Answer.** Not as it stands: the signal is nearly right, but of three detectors, the PCA residual alarms on all nominal telemetry, and
+# the isolation forest finds far fewer faults than after real data.
+# The tool of this project, `python -m enhsim_tf fit`, draws windows of real noise again instead ([noise](../docs/noise.md)).
 #
 # ## Exercises
 #
@@ -347,31 +354,3 @@ check_answer(
     lambda arm: arm == answers_paper.kind_to_deliver(rates),
     "rates[arm] has the false-alarm rates of the three detectors.",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. What the enhancer hides</summary>
-#
-# ```python
-# changes = {}
-# for mode in MODES:
-#     fault = pipeline.enhance(degraded(pipeline, mode, 0.8)[0])
-#     changes[mode] = np.sqrt(np.mean((fault - nominal) ** 2))
-#     print(f"{mode:14} {changes[mode]:.3f}")
-# hidden_best = min(changes, key=changes.get)
-# ```
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. What to deliver</summary>
-#
-# ```python
-# chosen_arm = min((arm for arm in arms if arm != "real"), key=lambda arm: rates[arm].max())
-# print(chosen_arm, f"finds {recall[chosen_arm].mean():.0%} of the faults, detectors trained on real data {recall['real'].mean():.0%}")
-# ```
-#
-# Gaussian noise is right here, since the real noise is white. But compare the recall, too: the autoencoder then finds fewer faults.
-#
-# </details>

@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Source and target (Figure 2)
+# # Source and target (Figures 2 and 14)
 #
 # **Question:** what does a crude simulator know about the signal, and what does it not know?
 #
@@ -52,6 +52,13 @@ from enhsim_tf import SquareWave, SquareWaveSimulator
 simulator = SquareWaveSimulator([SquareWave(P, low=-A, high=A) for P, A in zip(periods, amplitudes)])
 np.testing.assert_array_equal(simulator(time_s), coarse)
 np.testing.assert_allclose(pipeline.simulator(time_s), coarse)
+
+# %% [markdown]
+# The telemetry is the truth with white noise. It is written to a store once, and every later step reads it from there (the paper's figure
+# 14, which its source has commented out):
+
+# %%
+show(pipeline, "fig14_telemetry_store")
 
 # %% [markdown]
 # Training pairs are windows of 500 samples, cut from the telemetry at random times. The source is simulated for exactly the same times.
@@ -164,30 +171,3 @@ check_answer(
     lambda number: number == answers_paper.num_distinct(480, 100) and num_distinct(480, 120.5) > 100_000,
     "After how many samples do both waves start again together?",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. The best square wave</summary>
-#
-# ```python
-# smallest_nrmse = np.sqrt(1 - 8 / np.pi**2)
-# ```
-#
-# The best constant for half a period is the mean of the sine there, $2A/\pi$. Then the mean square error is
-# $A^2\left(\tfrac12-\tfrac4{\pi^2}\right)$, which in units of the variance $A^2/2$ is $1-8/\pi^2$.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. Different windows</summary>
-#
-# ```python
-# def num_distinct(orbit_s, rotation_s):
-#     return int(np.lcm(int(2 * orbit_s), int(2 * rotation_s))) // 2  # also for half seconds
-# ```
-#
-# The least common multiple of 480 and 100 is 2,400. With 120.5 s, both waves meet again only after 115,680 samples, more than a
-# day. The inputs become many, and an enhancer can no longer learn each of them by heart.
-#
-# </details>

@@ -208,32 +208,3 @@ check_answer(
     lambda weights: np.allclose(trained(weights, order), trained(start, np.arange(500)), rtol=1e-3),
     "The first kernel has a row for each input sample, the last kernel a column for each output sample.",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. Parameters</summary>
-#
-# ```python
-# def num_parameters(w):
-#     return w * (w + 1) + 3_200 * (w + 1) + 3_200 * 3_201 + w * 3_201
-# ```
-#
-# Only the layer between the hidden ones does not depend on $w$. The first grows with its square.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. Any order is as good</summary>
-#
-# ```python
-# def permuted(weights):
-#     first, *between, last, bias = weights
-#     return [first[order], *between, last[:, order], bias[order]]
-# ```
-#
-# The losses agree to rounding in every epoch. The network learns which of its 500 inputs go with which of its 500 outputs, in any order.
-# So it gets nothing for free from smoothness in time: neighbouring outputs agree only as far as the data taught it. Notebook 04 shows
-# what that leaves behind.
-#
-# </details>

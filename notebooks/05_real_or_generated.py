@@ -94,16 +94,14 @@ say(f"AUC of the classifier: **{auc:.2f}**. Chance is 0.5.")
 assert auc > {"full": 0.8, "smoke": 0.5}[budget]
 
 # %% [markdown]
-# C7 sets the limit elsewhere: generated telemetry must not be easier to recognise than real telemetry whose values are all multiplied by
-# 1.1. (The package draws the noise anew and uses two more features, so that its AUC differs a little from the one above.)
+# C7 allows an AUC of 0.1 above the *floor*, which is the AUC of real telemetry against other real telemetry. (The package draws the noise
+# anew and uses two more features, so that its AUC differs a little from the one above.)
 
 # %%
 (record,) = verdict(pipeline, "C7", limits=False)
-auc, limit = (record["measured"][name] for name in ("auc", "louder_auc"))
-say(
-    f"AUC of generated telemetry **{auc:.2f}**, of telemetry that is 10 % larger **{limit:.5f}**. A limit so high excludes next to nothing."
-)
-assert budget == "smoke" or limit > 0.99
+auc, floor = (record["measured"][name] for name in ("auc", "floor_auc"))
+say(f"AUC of generated telemetry **{auc:.2f}**, floor **{floor:.2f}**.")
+assert budget == "smoke" or auc - floor > 0.1
 
 # %% [markdown]
 # ## The noise alone
@@ -112,8 +110,8 @@ assert budget == "smoke" or limit > 0.99
 show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* little at a glance. But what windows share is invisible in a single one. Here is the first minute of the mean of the four
-# windows of each kind, with that of four others:
+# *What to see:* little at a glance, except that the largest samples are in a generated window (*d*). But what windows share is invisible in
+# a single one. Here is the first minute of the mean of the four windows of each kind, with that of four others:
 
 # %%
 four_generated = pipeline.generate_noise(4, pipeline.draw("figure 6"))
@@ -143,16 +141,16 @@ say(
 assert correlation["generated"] > {"full": 0.3, "smoke": 0.1}[budget] > abs(correlation["real"])
 
 # %% [markdown]
-# In how many dimensions do many windows vary? The *effective rank* counts them ([09](09_generator.ipynb) writes it in four lines):
+# In how many dimensions do many windows vary? The *effective rank* counts them: it is e to the entropy of the shares of the variance that
+# the principal components have ([09](09_generator.ipynb) has its four lines of code).
 
 # %%
 found = noise_resemblance(pipeline)
-rank_generated, rank_real = found["rank"], found["real_rank"]
+share = found["rank_ratio"]
 say(
-    f"Effective rank of {len(pipeline.noise_windows('test')):,} windows: **{rank_generated:.1f}** generated, **{rank_real:.0f}** real, "
-    f"a share of {rank_generated / rank_real:.1%}."
+    f"Effective rank of {len(pipeline.noise_windows('test')):,} windows of generated noise: **{share:.1%}** of that of real noise."
 )
-assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[budget]
+assert share < {"full": 0.2, "smoke": 0.6}[budget]
 
 # %% [markdown]
 # ## Long stretches
@@ -189,7 +187,7 @@ for name, row in series.items():
     rest, _ = extract_noise(row, pipeline.settings.moving_average)
     repeats[name] = np.corrcoef(rest[:-size], rest[size:])[0, 1]
     print(f"{name:10} correlation of the noise with itself one window later: {repeats[name]:.2f}")
-assert repeats["generated"] > {"full": 0.3, "smoke": 0.05}[budget] > abs(repeats["real"])
+assert repeats["generated"] > {"full": 0.1, "smoke": 0.05}[budget] > abs(repeats["real"])
 
 # %% [markdown]
 # **Answer.** There is a difference, although little shows at a glance. A classifier has an AUC above 0.9, and windows of generated noise
@@ -230,34 +228,3 @@ check_answer(
     lambda number: number == answers_paper.right_guesses_needed(100, 0.05),
     "The number of right guesses is binomial with n = 100 and p = 1/2; scipy.stats.binom has its tail.",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. What the classifier looks at</summary>
-#
-# ```python
-# aucs = [roc_auc_score(is_generated, column) for column in features.T]
-# for name, auc in zip(names, aucs):
-#     print(f"{name:35} AUC {auc:.2f}")
-# best_auc = max(max(auc, 1 - auc) for auc in aucs)
-# ```
-#
-# With seed 0 it is the power at two and three cycles per window: generated noise has more of it than real noise, from which the moving
-# average has removed most of these slow waves (notebook 08). A band a little higher separates nearly as well, the other way round.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. How many right answers</summary>
-#
-# ```python
-# from scipy.stats import binom
-#
-# needed = next(number for number in range(101) if binom.sf(number - 1, 100, 0.5) <= 0.05)
-# print(needed)
-# ```
-#
-# About $n/2+1/2+0.82\sqrt{n}$, rounded up. In the quiz above, all four letters must be right.
-#
-# </details>

@@ -156,9 +156,10 @@ assert np.abs(measured / predicted - 1).max() < 0.03
 # %% [markdown]
 # ## The filter leaves a mark
 #
-# White noise was put in, but what comes out is not quite white, because near samples share most of the average that was subtracted. For a
-# lag $k$ up to half the width, the covariance of the noise alone is $-\sigma^2\,(w+k)/w^2$; beyond that, up to the width, it is
-# $\sigma^2\,(w-k)/w^2$, hence the step, and then 0. The remains of the waves add a little at all lags.
+# White noise was put in, but what comes out is not quite white. Up to half the width, the noise of a sample is also a part of the average
+# that is subtracted from its neighbour at lag $k$, and the other way round: this gives a covariance of $-2\sigma^2/w$. The two averages
+# share $w-k$ samples, which gives $+\sigma^2\,(w-k)/w^2$. The sum is $-\sigma^2\,(w+k)/w^2$: the first effect is larger. Beyond half
+# the width, only the second is left, hence the step, and beyond the width none. The remains of the waves add a little at all lags.
 
 # %%
 lags = np.arange(1, 40)
@@ -227,33 +228,3 @@ check_answer(
     lambda share: abs(share - answers_paper.share_of_sd(slow, 25)) < 1e-3,
     "What is left of a series by the filter of this lesson?",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. The best width</summary>
-#
-# ```python
-# best_width = int(widths[np.argmin([abs(extract(values[:50_000], each).std() - true_sd) for each in widths])])
-# ```
-#
-# Noise is missing and wave is added, and at this width both cancel in the standard deviation. They cancel *only* there: the extracted
-# noise still holds a trace of the wave.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. Slow noise</summary>
-#
-# ```python
-# def surviving_share(series, width):
-#     return extract(series, width).std() / series.std()
-#
-#
-# print(f"{surviving_share(slow, 25):.0%} of the slow noise is left")
-# ```
-#
-# About a tenth. The average follows slow noise as it follows the signal, so that the noise ends up in the *waveform*, for which the
-# enhancer has no input. What the paper calls noise is its fast part.
-#
-# </details>

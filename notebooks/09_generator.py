@@ -23,9 +23,9 @@ pipeline, budget = open_pipeline()
 # %% [markdown]
 # ## The network
 #
-# The *latent vector* $z$ holds 16 independent random numbers from a normal distribution. Each draw of $z$ gives one window of noise $G(z)$.
-# Batch normalisation subtracts from each neuron its mean over the batch and divides by its standard deviation; a scale and a shift, both
-# learned, follow. The tanh keeps the noise between −1 and 1.
+# The *latent vector* $z$ holds 16 independent random numbers from a normal distribution with standard deviation 4, as in the author's code.
+# Each draw of $z$ gives one window of noise $G(z)$. Batch normalisation subtracts from each neuron its mean over the batch and divides by
+# its standard deviation; a scale and a shift, both learned, follow. The tanh keeps the noise between −1 and 1.
 
 # %%
 import keras
@@ -86,14 +86,14 @@ def update_generator(generator, discriminator, optimizer, latent):
 # %%
 import dataclasses
 
-from enhsim_tf.paper.noise import NoiseGAN, build_discriminator, build_generator
+from enhsim_tf.paper.noise import build_discriminator, build_generator, connect
 
 settings = dataclasses.replace(pipeline.settings, dropout=0.0)  # so that nothing is dropped at random
 packaged, discriminator = build_generator(settings), build_discriminator(settings)
 generator.set_weights(packaged.get_weights())
-gan = NoiseGAN(packaged, discriminator, settings)
-gan.compile()
-latent = keras.random.normal((200, 16), seed=keras.random.SeedGenerator(0))  # what the package draws first
+gan = connect(packaged, discriminator, settings)
+# what the package draws first
+latent = settings.latent_scale * keras.random.normal((200, 16), seed=keras.random.SeedGenerator(0))
 
 first = generator.get_weights()
 loss = update_generator(generator, discriminator, keras.optimizers.Adam(0.001), latent)
@@ -122,7 +122,7 @@ say(
 # %%
 trained = pipeline.generator
 first, normalise, last, _ = trained.layers
-latent = np.random.default_rng(0).standard_normal((1_000, 16), "float32")
+latent = settings.latent_scale * np.random.default_rng(0).standard_normal((1_000, 16), "float32")
 hidden = np.asarray(normalise(first(latent)), float)
 before_tanh = hidden @ np.asarray(last.kernel, float) + np.asarray(last.bias, float)
 generated = np.asarray(trained(latent))[:, :, 0]
@@ -235,45 +235,3 @@ check_answer(
     is_right,
     "Draw latent vectors of shape (1000, latent), predict, and drop the last axis: windows[:, :, 0].",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. Without relu</summary>
-#
-# ```python
-# rank_without_relu = 16
-# ```
-#
-# Without relu everything is one linear map from 16 dimensions, so 16 is the rank. The relu folds the 16-dimensional space, so that its
-# image bends through up to 64 dimensions.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. Which change helps</summary>
-#
-# ```python
-# def rank_of_untrained(latent, hidden):
-#     keras.utils.set_random_seed(0)
-#     model = keras.Sequential(
-#         [
-#             keras.Input((latent,)),
-#             layers.Dense(hidden, activation="relu", kernel_initializer="he_uniform"),
-#             layers.BatchNormalization(),
-#             layers.Dense(500, activation="tanh"),
-#         ]
-#     )
-#     draws = np.random.default_rng(0).standard_normal((1_000, latent), "float32")
-#     return rank(model.predict(draws, verbose=0))
-#
-#
-# for sizes in ((16, 64), (256, 64), (16, 512), (256, 512)):
-#     print(sizes, f"effective rank {rank_of_untrained(*sizes):.0f}")
-# one_is_enough = False
-# ```
-#
-# Both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it.
-# Compare the numbers with the rank of real noise above. Training then decides how much of its rank a generator uses.
-#
-# </details>

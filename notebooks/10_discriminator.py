@@ -106,7 +106,7 @@ def update_discriminator(discriminator, optimizer, real, generated):
 # %%
 import dataclasses
 
-from enhsim_tf.paper.noise import NoiseGAN, build_discriminator, build_generator, labels
+from enhsim_tf.paper.noise import build_discriminator, build_generator, connect, labels
 
 settings = dataclasses.replace(pipeline.settings, dropout=0.0)
 generator, packaged = build_generator(settings), build_discriminator(settings)
@@ -114,8 +114,7 @@ discriminator.set_weights(packaged.get_weights())
 for layer in discriminator.layers:
     if isinstance(layer, layers.Dropout):
         layer.rate = 0.0
-gan = NoiseGAN(generator, packaged, settings)
-gan.compile()
+gan = connect(generator, packaged, settings)
 optimizer, rng = keras.optimizers.Adam(0.001), np.random.default_rng(0)
 
 for _ in range(5):
@@ -171,9 +170,9 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
     panels[0].set(ylabel="probability real, changed")
 
 # %% [markdown]
-# *What to see:* on the left, the points lie near the diagonal. In the middle they scatter more widely, most below it, and on the right they
-# lie far below it. (The axes differ in scale.) Reordered blocks keep nearly all pieces of 20 samples, reordered samples keep none, and in
-# the larger windows every piece has grown.
+# *What to see:* on the left, the points lie near the diagonal. In the middle they scatter more widely, and on the right they scatter most,
+# and many lie far below it. (The axes differ in scale.) Reordered blocks keep nearly all pieces of 20 samples, reordered samples keep none,
+# and in the larger windows every piece has grown.
 
 # %%
 moved = {name: float(np.mean(np.abs(other - recorded))) for name, other in judged.items()}
@@ -241,7 +240,7 @@ with drawing(alt, height=1.7, title=title) as panel:
 # *What to see:* the discriminator is near its floor and near 0.5, and the other two judges are far from their floors. (A floor below 0.5
 # shows how far chance, or a difference between training and held-out windows, moves the AUC.) Generated windows differ from real ones, and
 # a linear classifier is enough to find it. The lost places are not the whole reason: the power of each frequency holds no places either.
-# The generator learns from the discriminator alone, which at this point cannot tell the two apart.
+# The generator learns from the discriminator alone, which at this point can hardly tell the two apart.
 
 # %%
 for name in judges:
@@ -290,29 +289,3 @@ check_answer(
     lambda found: abs(roc_auc_score([0] * 20 + [1] * 20, found) - 0.5) > 0.49,
     "What would you compute from all 200 windows that you cannot compute from one?",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. Without the maximum</summary>
-#
-# ```python
-# parameters_without_maximum = 500 * (20 + 1) + 25 * (121 * 500 + 1) + 25 + 1
-# ```
-#
-# More than a million: the maximum keeps the discriminator small, and it forgets where in the window a piece was.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. A number for a batch</summary>
-#
-# ```python
-# def number_of_batch(windows):
-#     return windows.mean(axis=0).std()
-# ```
-#
-# Windows of real noise cancel in the mean; generated windows share a pattern that remains. The effective rank separates them as well. A
-# discriminator that is given such a number beside each window ("minibatch standard deviation" in the literature) can see it, too.
-#
-# </details>

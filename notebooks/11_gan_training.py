@@ -105,11 +105,10 @@ def train_step(real, latent, latent_again):
 # %%
 import dataclasses
 
-from enhsim_tf.paper.noise import NoiseGAN, build_discriminator, build_generator
+from enhsim_tf.paper.noise import build_discriminator, build_generator, connect
 
 without_dropout = dataclasses.replace(settings, dropout=0.0)
-packaged = NoiseGAN(build_generator(settings), build_discriminator(without_dropout), without_dropout)
-packaged.compile()
+packaged = connect(build_generator(settings), build_discriminator(without_dropout), without_dropout)
 generator.set_weights(packaged.generator.get_weights())
 discriminator.set_weights(packaged.discriminator.get_weights())
 drops = [layer for layer in discriminator.layers if isinstance(layer, layers.Dropout)]
@@ -119,7 +118,8 @@ rng, seeds = np.random.default_rng(0), keras.random.SeedGenerator(settings.seed)
 
 def draw_batch():
     real = tf.constant(rng.choice(noise, 100)[:, :, None])
-    return real, *(keras.random.normal((number, 16), seed=seeds) for number in (100, 200))
+    latents = (keras.random.normal((number, 16), seed=seeds) for number in (100, 200))
+    return real, *(settings.latent_scale * latent for latent in latents)
 
 
 for drop in drops:
@@ -145,7 +145,7 @@ train_step = tf.function(
     train_step.python_function
 )  # compiled anew, because the first one was compiled without dropout
 num_iterations = settings.iterations
-latent = np.random.default_rng(0).standard_normal((500, 16), "float32")
+latent = settings.latent_scale * np.random.default_rng(0).standard_normal((500, 16), "float32")
 every, frames = max(num_iterations // 50, 1), {}
 
 for iteration in range(5, num_iterations + 1):
@@ -264,10 +264,10 @@ def update_twice(
 # %%
 twice = dataclasses.replace(without_dropout, update="two of 200")
 judges = [build_discriminator(twice) for _ in range(2)]
-reference = NoiseGAN(build_generator(twice), judges[1], twice)
-reference.compile()
+reference = connect(build_generator(twice), judges[1], twice)
 real_rows = tf.constant(np.random.default_rng(1).choice(noise, 200)[:, :, None])
 first_latent = keras.random.normal((200, 16), seed=keras.random.SeedGenerator(settings.seed))
+first_latent = settings.latent_scale * first_latent
 generated_rows = reference.generator(first_latent, training=False)
 error = update_twice(judges[0], keras.optimizers.Adam(0.001), real_rows, generated_rows)
 reference.train_step(real_rows)
@@ -276,40 +276,3 @@ check_answer(
     lambda _: all(np.allclose(*w, atol=3e-4) for w in zip(*(judge.get_weights() for judge in judges))),
     "The tags of real rows are tf.ones((200, 1)), those of generated rows tf.zeros((200, 1)).",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. The pull on the generator</summary>
-#
-# ```python
-# def pull_reversed_tags(D):
-#     return 1 - D
-#
-#
-# def pull_maximised_loss(D):
-#     return D
-# ```
-#
-# *If* the discriminator is sure, D is near 0 for generated rows. There the maximised loss is flat and teaches nothing,
-# while the reversed tags pull with full strength. Both have their optimum in the same place.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. Two updates</summary>
-#
-# ```python
-# def update_twice(discriminator, optimizer, real, generated):
-#     for rows, tags in ((real, tf.ones((200, 1))), (generated, tf.zeros((200, 1)))):
-#         with tf.GradientTape() as tape:
-#             error = loss(tags, discriminator(rows, training=True))
-#         weights = discriminator.trainable_variables
-#         optimizer.apply(tape.gradient(error, weights), weights)
-#     return float(error)
-# ```
-#
-# The discriminator then takes two steps of Adam in an iteration, and the generator one. The paper speaks of one batch; the author's
-# public code takes two. `python -m enhsim_tf.reproduce --set "update=two of 200"` shows what it changes.
-#
-# </details>

@@ -33,7 +33,7 @@ claim("C4", "C5")
 import keras
 import tensorflow as tf
 
-from enhsim_tf.paper.noise import NoiseGAN, build_discriminator
+from enhsim_tf.paper.noise import build_discriminator, connect
 
 settings = pipeline.settings
 discriminator = build_discriminator(settings)
@@ -41,6 +41,7 @@ discriminator.load_weights(pipeline.gan_folder / "discriminator.weights.h5")
 noise = pipeline.noise_windows("train", settings.num_windows, "noise windows")
 real = np.random.default_rng(0).choice(noise, settings.rows)[:, :, None]
 latent = keras.random.normal((settings.rows, 16), seed=keras.random.SeedGenerator(settings.seed))
+latent = settings.latent_scale * latent
 generated = pipeline.generator(latent, training=False)
 by_hand = {}
 for kind, batch, is_real in (("real", real, True), ("generated", generated, False)):
@@ -48,8 +49,7 @@ for kind, batch, is_real in (("real", real, True), ("generated", generated, Fals
     by_hand[f"accuracy_{kind}"] = np.mean((D > 0.5) == is_real)
     by_hand[f"loss_{kind}"] = np.mean(-np.log(D if is_real else 1 - D))
 
-gan = NoiseGAN(pipeline.generator, discriminator, settings)
-gan.compile()
+gan = connect(pipeline.generator, discriminator, settings)
 packaged = gan.test_step(tf.constant(real))  # what the package records; it draws the same latent vectors
 for name, value in by_hand.items():
     np.testing.assert_allclose(value, float(packaged[name]), rtol=1e-4)  # Keras computes the loss in 32 bits
@@ -65,7 +65,7 @@ num_records = settings.iterations // settings.record_every
 history = {key: values[:num_records] for key, values in pipeline.history.items() if values.ndim}
 
 # %% [markdown]
-# *What to see:* both losses stay near ln 2 after the first record. When one accuracy rises, the other falls: the discriminator has an
+# *What to see:* both losses stay near ln 2. When one accuracy rises, the other falls: the discriminator has an
 # opinion, but it is about as often wrong as right.
 
 # %%
@@ -149,19 +149,20 @@ if budget == "full":
 # %% [markdown]
 # ## The verdicts
 #
-# C4 asks when the noise has settled: when its standard deviation stays within 10 %, and its lag-1 correlation within 0.05, of the median
-# over the last quarter.
+# C4 compares how wrong the noise is around the paper's number of iterations with earlier and later ones. Wrong is the larger of two errors:
+# that of the standard deviation in units of 10 %, and that of the lag-1 correlation in units of 0.05.
 
 # %%
-iterations = followed["iteration"]
-late = iterations > 0.75 * iterations[-1]
-curves = {"standard deviation": (np.log(size), 0.1), "lag-1 correlation": (followed["lag_one"], 0.05)}
-for name, (values, allowed) in curves.items():
-    outside = iterations[np.abs(values - np.median(values[late])) > allowed]
-    say(f"Last record with a {name} outside: **{outside.max(initial=0):,}**.")
+progress = followed["iteration"] / settings.iterations
+lag_error = np.abs(followed["lag_one"] - followed["real_lag_one"])
+error = np.maximum(np.abs(np.log(size)) / 0.1, lag_error / 0.05)
+for stretch, (first, last) in {"early": (0, 0.5), "around it": (0.75, 1.25), "later": (1.5, 2)}.items():
+    mean = error[(progress > first) & (progress <= last)].mean()
+    say(f"Mean error {stretch} ({first:g} to {last:g} times the number): **{mean:.2f}**.")
 
 # %% [markdown]
-# C4 takes the record after the later one, and allows half the paper's number of iterations more or less.
+# C4 asks that the error around it is at most 1.5 times the later one, and, to hold in full, that the early one is at least 1.5 times as
+# large.
 #
 # C5 has two parts. *Balanced*: in the second half of training, the share of rows that is classified correctly may lie between 0.5, a coin,
 # and 0.8, where the discriminator would be far ahead. It may miss either end by chance, so its interval counts. And neither kind alone may
@@ -184,18 +185,19 @@ for half, chosen in {"first": ~is_late, "second": is_late}.items():
     assert budget == "smoke" or np.ptp(records) > 2 * (high - low)
 
 # %% [markdown]
-# The interval counts the chance in the rows only. The records of a half differ by far more, so the first half's lead over 0.5 may be
-# chance. One seed is not enough: the [study of readings](../studies/readings/README.md) repeats this over seeds, roundings and readings
+# The interval counts the chance in the rows only. The records of a half differ by far more, so whether the interval lies above 0.5 can
+# change with the seed. The verdict below applies the limits to this one run, and says no more than that this run keeps them or not. The
+# *published* verdict rests on many: the [study of readings](../studies/readings/README.md) repeats this over seeds, roundings and readings
 # of the paper.
 
 # %%
 _ = verdict(pipeline, "C4", "C5")
 
 # %% [markdown]
-# In this run, the two stay balanced (C5), but the noise's lag-1 correlation had not settled by the limit of C4.
+# These verdicts are those of one run. Over many, both claims are undecided.
 #
 # **Answer.** Little. Accuracy and loss show that *this* discriminator is right no more often than a coin in the second half of training.
-# The noise's own curves show more: its standard deviation settles early, its lag-1 correlation hardly at all. None shows how few dimensions
+# The noise's own curves show more: whether its standard deviation and its lag-1 correlation are right. None shows how few dimensions
 # it fills: its effective rank is less than a tenth of the real one.
 #
 # ## Exercises
@@ -229,11 +231,11 @@ short = noise[:500, :100]
 
 
 def size_after_training(speed):
-    pair = NoiseGAN(build_generator(small), build_discriminator(small), small)
-    pair.compile()
-    pair.discriminator_adam.learning_rate = 0.001 * speed
+    pair = connect(build_generator(small), build_discriminator(small), small)
+    pair.discriminator_optimizer.learning_rate = 0.001 * speed
     # your code: train `pair` on `short`, generate 500 windows, and return the ratio; enhsim_tf.paper.noise has
-    # train_gan(pair, rows, first_iteration, last_iteration) and generate_noise(generator, number, small, rng)
+    # train_gan(pair, draw, first_iteration, last_iteration), whose draw(number, rng) returns real rows, and
+    # generate_noise(generator, number, small, rng)
     return None
 
 
@@ -241,43 +243,6 @@ def size_after_training(speed):
 sizes = [size_after_training(speed) for speed in (0.1, 10)]
 check_answer(
     None if sizes[0] is None else sizes,
-    lambda found: found[1] < 0.7 * found[0],
+    lambda found: found[1] < 0.7 * found[0] and 0.5 < found[1] < 2,
     "Both pairs start alike and may differ only in the learning rate; divide by the standard deviation of `short`.",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. What "75 % of real rows" is worth</summary>
-#
-# ```python
-# probability_real = 0.75 / (0.75 + 0.75)
-# ```
-#
-# One half: it calls three quarters of everything real, so its word says nothing. That is why the claim is evaluated on both kinds
-# together, and asks that neither is recognised too rarely.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. An unbalanced game</summary>
-#
-# ```python
-# from enhsim_tf.paper.noise import generate_noise, train_gan
-#
-#
-# def size_after_training(speed):
-#     pair = NoiseGAN(build_generator(small), build_discriminator(small), small)
-#     pair.compile()
-#     pair.discriminator_adam.learning_rate = 0.001 * speed
-#     train_gan(pair, short, 0, 400)
-#     return generate_noise(pair.generator, 500, small, np.random.default_rng(0)).std() / short.std()
-#
-#
-# for speed in (0.1, 10):
-#     print(f"speed {speed}: {size_after_training(speed):.1f} times the real standard deviation")
-# ```
-#
-# The slow discriminator leaves the noise several times too large: on this side at least, the paper's warning about imbalance holds.
-#
-# </details>

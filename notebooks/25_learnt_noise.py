@@ -5,8 +5,8 @@
 #
 # - **After this lesson** you can fit noise by maximum likelihood, without a discriminator, in two ways: by least squares, and with a
 #   network that predicts a density. You can say what each of them has learnt.
-# - **You should know** the noise of notebook 08, the effective rank (notebook 09), the threshold of notebook 13, and the real-vs-real
-#   baseline (notebook 21).
+# - **You should know** the noise of notebook 08, the effective rank (notebook 09), and the threshold and the floor of a measure (notebook
+#   13).
 # - **Terms:** [autoregression](../docs/glossary.md#autoregression): each sample is predicted from the samples before it; *likelihood*: the
 #   probability density that a model gives to data; *loss*: here its negative logarithm, the mean over samples, so that smaller is better;
 #   [effective rank](../docs/glossary.md#effective-rank); [false-alarm rate](../docs/glossary.md#false-alarm-rate);
@@ -301,7 +301,7 @@ with drawing(alt, 2, 2.1, title, sharex=True, sharey=True) as panels:
 # from the floor.
 #
 # Residual windows *are* real, and the classifier still recognises some. Some occur twice, so it may judge a window whose copy it has
-# learnt; this lowers their rank, too. `fit` therefore draws no window twice while others are left.
+# learnt; this lowers their rank, too. Telemetry that `fit` and `generate` make of a short record has the same weakness.
 
 # %%
 for name in ("normal distribution", "autoregression"):
@@ -403,30 +403,3 @@ check_answer(
     lambda rank: abs(rank - answers_tool.rank_when_drawn_again(noises["white"][0][:50], 1_000)) < 0.8,
     "How many different windows are among the thousand?",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. The floor of a likelihood</summary>
-#
-# ```python
-# smallest_loss = 0.5 * np.log(2 * np.pi) + 0.5
-# print(f"floor {smallest_loss:.3f}, network on later windows {losses['white']['network']:.3f}")
-# ```
-#
-# The gap between the two numbers is all that a better model could still gain.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. Few windows, drawn often</summary>
-#
-# ```python
-# few = noises["white"][0][:50]
-# drawn_rank = measures.effective_rank(few[np.random.default_rng(1).integers(0, 50, 1_000)])
-# print(f"{drawn_rank:.0f} of {measures.effective_rank(noises['white'][0]):.0f}")
-# ```
-#
-# At most 50: drawing again adds no direction. A model that has learnt the noise makes new windows.
-#
-# </details>

@@ -141,8 +141,8 @@ detectors = {
 # The fault: the second sensor feels the sunlight of another time, as if it sat elsewhere. The residual windows of each channel stay as they
 # were; only their pairs change. The last row asks whether the simulator is needed at all: its detector learns the telemetry itself. (The
 # same windows, from which all training windows are drawn, set the thresholds. With 4 or 8 numbers for each of 780 windows this hardly
-# changes the threshold, as the false alarms show. A PCA residual of 20 directions of 500 needs other windows for its threshold, see
-# notebook 28.)
+# changes the threshold, as the false alarms show. A PCA residual of 20 directions of 500 needs other windows for its threshold, see the
+# study of [few windows](../studies/few_windows/README.md).)
 
 # %%
 other = np.random.default_rng(2).permutation(len(new_residuals))
@@ -181,12 +181,10 @@ assert rates["each channel alone"][0] < 0.05 and rates["both, without a simulato
 # %% [markdown]
 # ## The same with the package
 #
-# `fit` learns all columns of a file together: one enhancer, residual windows drawn for all channels at once, and detectors of all channels.
-# Its report compares the cross-correlation of the noise with that of two halves of real noise, and says how many injected anomalies each
-# detector finds ([recall](../docs/glossary.md#recall)), of one channel and of the *relation* between channels. With several channels,
-# *residual* is the Mahalanobis distance above, of the means of whole windows and of quarters. The *PCA residual* is that of notebook 13,
-# and the *innovation* is what a linear prediction from the past of all channels does not explain. The *largest step* and the *moving
-# deviation* look at each channel alone, and find no relation.
+# `fit` learns all columns of a file together: one enhancer, and residual windows drawn for all channels at once. Its report compares the
+# cross-correlation of the noise with that of two halves of real noise. `score` adds up simple *views* of telemetry minus enhanced run
+# ([how](../docs/forms.md#how-telemetry-is-scored)). One of them, *relation*, is what a linear prediction from the past of all channels
+# leaves. In the later telemetry below, the second sensor feels the sunlight of another time from 5,000 s to 7,000 s:
 
 # %%
 from enhsim_tf import FitOptions, clean, fit, read_recording, read_source
@@ -196,11 +194,25 @@ measured = read_source(pd.DataFrame(telemetry[1_000:21_000], clock, ["sunny side
 simulated = read_recording(pd.DataFrame({"current": current[1_000:21_000]}, clock))
 options = FitOptions(window=window, num_windows=600, enhancer="ridge", noise="residual windows")
 model, report = fit({name: clean(series).parts for name, series in measured.items()}, simulated, options)
-print("\n".join(line for line in report.lines() if "correlation of the noise" in line or "detectors" in line))
+print("\n".join(line for line in report.lines() if "correlation of the noise" in line))
+
+from enhsim_tf import events_table, read_telemetry, score
+
+later_on = telemetry[21_000:31_000].copy()
+later_on[5_000:7_000, 1] += 0.25 * (sunlight[41_000:43_000] - sunlight[26_000:28_000])
+clock = clock[:10_000]
+(new,) = read_telemetry(pd.DataFrame(later_on, clock, ["sunny side", "back"]))
+events = events_table(
+    score(model, new, read_recording(pd.DataFrame({"current": current[21_000:31_000]}, clock)))
+)
+print(events[["begin", "end", "detected", "views", "channels"]].to_string(index=False))
+of_the_fault = events[events["begin"].between(4_900, 5_200)]
+assert len(of_the_fault) == 1 and of_the_fault["views"].str.startswith("relation").all()
 
 # %% [markdown]
-# The noise's correlation is about as near to the real one as two halves of real noise are to each other. The three detectors of both
-# channels find nearly all of the changed relations.
+# The noise's correlation is about as near to the real one as two halves of real noise are to each other. The event of the fault begins near
+# its onset, and the relation of the channels raised most of it. The first event is a false alarm, and the last one lies within the event of
+# the fault.
 #
 # **Answer.** By a detector that sees all channels and has learnt how they move together. If it learns from generated windows, these must
 # keep the relation; residual windows drawn for all channels at once do.
@@ -238,32 +250,3 @@ check_answer(
     lambda value: abs(value - answers_tool.shared_quarters(quarters(residuals))) < 0.002,
     "quarters gives the channels of a quarter side by side: columns 0 and 1 belong to the first quarter.",
 )
-
-# %% [markdown]
-# ## Solution
-#
-# <details><summary>1. Late sunlight</summary>
-#
-# ```python
-# score = detectors["both, noise drawn jointly"]
-# share_late = np.mean(score(delayed) > conformal(score(residuals)))
-# print(f"{share_late:.0%}")
-# ```
-#
-# Most windows are found, although the delay is short; fewer than with a channel from another time.
-#
-# </details>
-
-# %% [markdown]
-# <details><summary>2. Shared quarters</summary>
-#
-# ```python
-# features = quarters(residuals)
-# correlation = np.corrcoef(features[:, 0], features[:, 1])[0, 1]
-# print(f"{correlation:.3f}, and over single samples {cross_correlation(residuals):.3f}")
-# ```
-#
-# It is higher than over single samples, because the noise that each channel has for itself is averaged away. That is why the detector looks
-# at means.
-#
-# </details>

@@ -8,11 +8,11 @@ from sklearn.metrics import roc_auc_score
 
 from enhsim_tf import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.measures import effective_rank, nrmse
-from enhsim_tf.detection.detectors import PCAResidual
-from enhsim_tf.detection.metrics import threshold
 from enhsim_tf.paper.claims import degraded_windows
 from enhsim_tf.paper.degraded import MODES
 from enhsim_tf.paper.noise import build_generator, extract_noise
+from enhsim_tf.scoring.metrics import threshold
+from studies.common.detectors import PCAResidual
 
 # -- 00 ----------------------------------------------------------------------------------------------------------------------
 
@@ -29,23 +29,6 @@ def mode_hidden_best(pipeline):
 def kind_to_deliver(rates):
     """The kind of training data with the smallest largest false-alarm rate, real data aside."""
     return min((kind for kind in rates if kind != "real"), key=lambda kind: rates[kind].max())
-
-
-# -- 01 ----------------------------------------------------------------------------------------------------------------------
-
-
-def mean_step_by_place(values, window):
-    """The mean size of the step to the next sample, at each place within a window."""
-    steps = np.abs(np.diff(values, append=values[-1]))
-    return [steps[place::window].mean() for place in range(window)]
-
-
-def correlation_of_sizes(pipeline):
-    """The correlation between the size of the enhanced signal and that of the noise that is added."""
-    coarse = pipeline.windows("test")["coarse"]
-    clean = pipeline.enhance(coarse)
-    noise = pipeline.combine(coarse, np.random.default_rng(1)) - clean
-    return np.corrcoef(np.abs(clean).ravel(), np.abs(noise).ravel())[0, 1]
 
 
 # -- 02 ----------------------------------------------------------------------------------------------------------------------

@@ -6,24 +6,28 @@ progress bar stays in its notebook. If only prose has changed, `--keep-outputs` 
 
 import argparse
 import base64
+import io
 import os
 import re
 import shutil
 import sys
-import tomllib
 from pathlib import Path
+from urllib.parse import unquote
 
 import jupytext
 import nbformat
 from nbclient import NotebookClient
+from PIL import Image
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file, sha256
+from enhsim_tf.common.console import run_command
+from enhsim_tf.common.errors import InputError
 from notebooks.lesson_tools import BUDGET, FULL, ROOT, STATIC
 
 FOLDER = Path(__file__).parent
 STAMP = "enhsim_tf"  # the metadata of a notebook that hold its budget and the checksums of the findings that it shows
 STUDY = re.compile(r'open_study\("(\w+)"\)')
-SOLUTION = re.compile(r"```python\n(.*?)```", re.DOTALL)  # the code of a folded solution
+SOLUTION = re.compile(r"```python\n(.*?)```", re.DOTALL)  # the code of a solution
 CHECK = "check_answer("  # what a cell calls that checks an answer
 FOLD = {
     "jupyter": {"source_hidden": True},
@@ -44,6 +48,8 @@ if not importlib.util.find_spec("lesson_tools"):
         subprocess.run(install, check=True)
     os.chdir("lessons/notebooks")
     sys.path.insert(0, os.getcwd())"""
+GITHUB = re.compile(r"https://github\.com/([\w.-]+/[\w.-]+?)(?:\.git)?/?")
+BRANCH = "lessons"  # which the workflow of the book writes; Colab opens lessons from it
 IMAGE = re.compile(r'(<img [^>]*src=)"(.*?)"')  # in a page
 TIMEOUT_S = 1_800  # for one cell: in a fresh clone it trains
 
@@ -53,17 +59,22 @@ def sources() -> list[Path]:
     return sorted(FOLDER.glob("[0-9][0-9]_*.py"))
 
 
-def published_at() -> str | None:
-    """The public address of the repository, in `[project.urls]` of `pyproject.toml`; None until it has one."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    return project.get("urls", {}).get("Repository")
-
-
 def badges(address: str, name: str) -> str:
-    """Links that open a notebook at an address of GitHub in Colab and in Binder."""
-    repository = address.removeprefix("https://github.com/").removesuffix("/").removesuffix(".git")
-    colab = f"https://colab.research.google.com/github/{repository}/blob/main/notebooks/{name}"
-    binder = f"https://mybinder.org/v2/gh/{repository}/main?labpath=notebooks/{name}"
+    """Links that open a notebook of a repository on GitHub in Colab and in Binder.
+
+    Args:
+        address: Address of the repository, `https://github.com/OWNER/NAME`.
+        name: File name of the notebook.
+
+    Raises:
+        InputError: If the address is another one.
+    """
+    match = GITHUB.fullmatch(address)
+    if match is None:
+        raise InputError(f"Expected https://github.com/OWNER/NAME. Received: {address!r}.")
+    repository = match[1]
+    colab = f"https://colab.research.google.com/github/{repository}/blob/{BRANCH}/notebooks/{name}"
+    binder = f"https://mybinder.org/v2/gh/{repository}/HEAD?labpath=notebooks/{name}"
     return (
         f"[![Open in Colab](https://colab.research.google.com/assets/colab-badge.svg)]({colab}) "
         f"[![Open in Binder](https://mybinder.org/badge_logo.svg)]({binder})"
@@ -99,22 +110,22 @@ def _number_cells(notebook: nbformat.NotebookNode) -> None:
         cell.id = f"cell-{number:02}"
 
 
-def solve(notebook: nbformat.NotebookNode) -> None:
-    """Adds to each check of an answer the code of its folded solution, and the check once more.
+def solutions_of(source: Path) -> list[str]:
+    """The code of the solutions of a lesson, in the order of its checks; lessons and the book do not hold them."""
+    text = (source.parent / "solutions" / f"{source.stem}.md").read_text(encoding="utf-8")
+    return SOLUTION.findall(text)
 
-    The first solution with code belongs to the first check, and so on.
+
+def solve(notebook: nbformat.NotebookNode, solutions: list[str]) -> None:
+    """Adds to each check of an answer the code of its solution, and the check once more.
 
     Raises:
         ValueError: If there are not as many solutions as checks.
     """
-    folded = [
-        cell.source for cell in notebook.cells if cell.cell_type == "markdown" and "<details>" in cell.source
-    ]
-    solutions = [code for source in folded for code in SOLUTION.findall(source)]
     checks = [cell for cell in notebook.cells if cell.cell_type == "code" and CHECK in cell.source]
     if len(solutions) != len(checks):
         raise ValueError(
-            f"Expected a folded solution with code for each check. Received: {len(solutions)} for {len(checks)}."
+            f"Expected a solution with code for each check. Received: {len(solutions)} for {len(checks)}."
         )
     for code, check in zip(solutions, checks, strict=True):
         at = notebook.cells.index(check) + 1
@@ -123,25 +134,24 @@ def solve(notebook: nbformat.NotebookNode) -> None:
     _number_cells(notebook)
 
 
-def drop_solutions(notebook: nbformat.NotebookNode) -> None:
-    """Removes the folded solutions."""
-    notebook.cells = [cell for cell in notebook.cells if "<details>" not in cell.source]
-
-
 def code_cells(notebook: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
     """The cells of a lesson that are executed; the set-up is none, because it does nothing in a clone."""
     return [cell for cell in notebook.cells if cell.cell_type == "code" and SET_UP not in cell.metadata]
 
 
-def keep_outputs(source: Path) -> nbformat.NotebookNode:
+def keep_outputs(source: Path, address: str | None = None) -> nbformat.NotebookNode:
     """The notebook beside a source with the prose that the source has now, and the outputs that it has.
+
+    Args:
+        source: One of `sources()`.
+        address: As for `read`.
 
     Raises:
         ValueError: If code has changed.
     """
     stored, wanted = (
         nbformat.read(source.with_suffix(".ipynb"), as_version=4),
-        read(source, published_at()),
+        read(source, address),
     )
     pairs = list(zip(code_cells(stored), code_cells(wanted)))
     if [cell.source for cell in code_cells(stored)] != [cell.source for cell in code_cells(wanted)]:
@@ -165,9 +175,9 @@ def execute(source: Path, budget: str = FULL, solved: bool = False) -> nbformat.
     Raises:
         nbclient.exceptions.CellExecutionError: If a cell raises.
     """
-    notebook = read(source, published_at())
+    notebook = read(source)
     if solved:
-        solve(notebook)
+        solve(notebook, solutions_of(source))
     client = NotebookClient(
         notebook,
         timeout=TIMEOUT_S,
@@ -194,7 +204,7 @@ def faults(source: Path) -> list[str]:
     path = source.with_suffix(".ipynb")
     if not path.is_file():
         return ["there is no notebook"]
-    notebook, wanted = nbformat.read(path, as_version=4), read(source, published_at())
+    notebook, wanted = nbformat.read(path, as_version=4), read(source)
     stamp = notebook.metadata.get(STAMP, {})
     wrong = {
         "its source has changed": [cell.source for cell in notebook.cells]
@@ -207,40 +217,54 @@ def faults(source: Path) -> list[str]:
 
 
 def build_slides(out: Path) -> None:
-    """Writes the lecture, `slides.py`, as one page for a browser, with pictures of lessons and of `figures/` inside it.
+    """Writes the lecture, `slides.py`, as one page for a browser that needs no network: its pictures are inside it.
 
-    A picture of a lesson is named `13_combined.ipynb#2`: the second that the notebook shows.
+    A picture of a lesson is named `13_combined.ipynb#2`: the second that the notebook shows. `#1|0.85` is the upper 85 % of the
+    first one.
     """
-    from nbconvert import SlidesExporter
+    from nbconvert.filters import markdown2html
 
-    def embed(match: re.Match) -> str:
-        begin, name = match.groups()
-        path, _, number = name.partition("#")
-        if number:
-            cells = nbformat.read(FOLDER / path, as_version=4).cells
-            data = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
-            png = [each["image/png"] for each in data if "image/png" in each][int(number) - 1]
+    sections: list[str] = []
+    for cell in jupytext.read(FOLDER / "slides.py", fmt="py:percent").cells:
+        html = IMAGE.sub(_embed, markdown2html(cell.source))
+        if cell.metadata["slideshow"]["slide_type"] == "notes":
+            sections[-1] += f"<aside>{html}</aside>"
         else:
-            png = base64.b64encode((FOLDER / path).read_bytes()).decode()
-        return f'{begin}"data:image/png;base64,{png}"'
-
-    deck = jupytext.read(FOLDER / "slides.py", fmt="py:percent")
-    exporter = SlidesExporter(
-        reveal_theme="white",
-        reveal_transition="none",
-        reveal_number="c/t",
-        reveal_width="1280",
-        reveal_height="720",
-    )
-    page, _ = exporter.from_notebook_node(
-        deck, {"metadata": {"name": "From a coarse simulation to telemetry"}}
-    )
+            sections.append(html)
+    body = "\n".join(f"<section>{section}</section>" for section in sections)
+    page = (FOLDER / "slides.html").read_text(encoding="utf-8")
+    page = page.replace("TITLE", "From a coarse simulation to telemetry").replace("SECTIONS", body)
     with replace_file(out) as temporary:
-        temporary.write_text(IMAGE.sub(embed, page), encoding="utf-8")
+        temporary.write_text(page, encoding="utf-8")
+
+
+def _embed(match: re.Match) -> str:
+    """The picture that an `<img>` names, inside it."""
+    begin, name = match.groups()
+    path, _, place = unquote(name).partition("#")
+    number, _, share = place.partition("|")
+    if number:
+        cells = nbformat.read(FOLDER / path, as_version=4).cells
+        data = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
+        pictures = [each["image/png"] for each in data if "image/png" in each]
+        png = base64.b64decode(pictures[int(number) - 1])
+    else:
+        png = (FOLDER / path).read_bytes()
+    if share:
+        picture, cropped = Image.open(io.BytesIO(png)), io.BytesIO()
+        height = int(float(share) * picture.height)
+        picture.crop((0, 0, picture.width, height)).save(cropped, "png", optimize=True)
+        png = cropped.getvalue()
+    return f'{begin}"data:image/png;base64,{base64.b64encode(png).decode()}"'
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command."""
+    """Runs the command. An error of the user is reported as one line, with exit code 2."""
+    return run_command(lambda: run(arguments), "interrupted; written notebooks are whole")
+
+
+def run(arguments: list[str] | None) -> int:
+    """Parses the command line and runs the command."""
     known = {source.stem[:2]: source for source in sources()}
     parser = argparse.ArgumentParser(prog="python -m notebooks.build", description=__doc__.split("\n\n")[0])
     parser.add_argument(
@@ -252,7 +276,9 @@ def main(arguments: list[str] | None = None) -> int:
         "--solved", action="store_true", help="with solved exercises, for lecturers; into solved/"
     )
     kind.add_argument(
-        "--student", action="store_true", help="without solutions, not executed anew; into student/"
+        "--published",
+        metavar="ADDRESS",
+        help="execute nothing: with badges and set-up for this repository on GitHub",
     )
     kind.add_argument("--slides", action="store_true", help="the lecture as a page, build/slides.html")
     options = parser.parse_args(arguments)
@@ -264,16 +290,14 @@ def main(arguments: list[str] | None = None) -> int:
         build_slides(make_folder(ROOT / "build") / "slides.html")
         return 0
     folder = FOLDER
-    if options.solved or options.student:
-        folder = make_folder(ROOT / ("solved" if options.solved else "student"))
+    if options.solved:
+        folder = make_folder(ROOT / "solved")
         shutil.copy(FOLDER / "lesson_tools.py", folder)  # a kernel starts in the folder of its notebook
     for number in options.lessons or known:
-        if options.keep_outputs or options.student:
-            notebook = keep_outputs(known[number])
+        if options.keep_outputs or options.published:
+            notebook = keep_outputs(known[number], options.published)
         else:
             notebook = execute(known[number], solved=options.solved)
-        if options.student:
-            drop_solutions(notebook)
         with replace_file(folder / known[number].with_suffix(".ipynb").name) as temporary:
             nbformat.write(notebook, temporary)
         print(f"{known[number].stem} written", flush=True)

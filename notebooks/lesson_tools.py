@@ -4,7 +4,9 @@ Jupyter starts the kernel of a lesson in the folder of the lesson, where it find
 that a lesson finds `enhsim_tf` and `studies` beside it. A lesson takes the paper's pipeline from here only.
 """
 
+import base64
 import contextlib
+import inspect
 import io
 import json
 import os
@@ -28,7 +30,7 @@ if str(ROOT) not in sys.path:
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED, QUIET, REAL, STYLE
 from enhsim_tf.common.stages import Stages, default_cache
-from enhsim_tf.paper.claims import BASIC, CLAIMS, OURS, WHOLE, degraded_windows, judge
+from enhsim_tf.paper.claims import BASIC, CLAIMS, SHOWN, WHOLE, degraded_windows, judge
 from enhsim_tf.paper.figures import FIGURES, save_figure
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.report import needed, short
@@ -39,14 +41,21 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FULL, SMOKE = "full", "smoke"
+DRAWN_BY_HAND = ("fig01_pipeline", "fig11_gan_training")  # figures that are kept as drawings
 BUDGET = "ENHSIM_TF_BUDGET"  # environment variable with the budget of the pipeline
-STATIC = (
-    "ENHSIM_TF_STATIC"  # set while a lesson is executed to be read: it then holds pictures instead of sliders
-)
+STATIC = "ENHSIM_TF_STATIC"  # set while a lesson is executed to be read: its sliders then need no kernel
 NOT_ANSWERED, RIGHT, NOT_YET = "Not yet answered.", "Right.", "Not yet."
+_MOST_FRAMES = 12  # drawn beforehand for a slider
+_frames: list[tuple[bytes, dict[str, Any]]] | None = (
+    None  # of a slider while they are drawn, instead of being displayed
+)
 _SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
 _LEDGER = {known.id: known for known in CLAIMS}
-_PART = {BASIC: "", WHOLE: " (to hold in full)", OURS: " (shown, does not decide)"}  # of a limit in a verdict
+_PART = {
+    BASIC: "",
+    WHOLE: " (to hold in full)",
+    SHOWN: " (shown, does not decide)",
+}  # of a limit in a verdict
 
 
 # -- the pipeline ------------------------------------------------------------------------------------------------------------
@@ -74,7 +83,7 @@ def open_pipeline() -> tuple[Pipeline, str]:
 
 
 def show(pipeline: Pipeline, name: str) -> None:
-    """Shows a figure of the paper as `figures/` holds it.
+    """Shows a figure of the paper as `figures/` holds it, and the folded code that draws it.
 
     Args:
         pipeline: As `open_pipeline` returns it.
@@ -85,6 +94,19 @@ def show(pipeline: Pipeline, name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         save_figure(name, pipeline, Path(folder), caption, is_smoke)
         _show_picture(Path(folder, f"{name}.png").read_bytes(), FIGURES[name].alt)
+    if name not in DRAWN_BY_HAND:
+        say(_code_of(name))
+
+
+def _code_of(name: str) -> str:
+    """The code that draws a figure, as it runs in a cell of a lesson."""
+    function = FIGURES[name].drawn_by
+    code = inspect.getsource(function)
+    code = code[code.index("def ") :]  # without its decorator
+    return (
+        "<details><summary>The code of this figure: copy it into a cell, and change it</summary>\n\n```python\n"
+        f"from enhsim_tf.paper.figures import *\n\n\n{code}\n\n{function.__name__}(pipeline)\n```\n\n</details>"
+    )
 
 
 def degraded(pipeline: Pipeline, mode: str, severity: float) -> "tuple[np.ndarray, np.ndarray]":
@@ -242,8 +264,52 @@ def _show_picture(png: bytes, alt: str) -> None:
     # 48 colours: a third of the bytes, the same to the eye
     picture.quantize(48, dither=Image.Dither.NONE).save(small, "png", optimize=True)
     about = {"width": int(picture.width * _SCREEN), "alt": alt}
+    if _frames is not None:
+        _frames.append((small.getvalue(), about))
+        return
     display(
         {"image/png": small.getvalue(), "text/plain": f"Figure: {alt}"},
+        metadata={"image/png": about},
+        raw=True,
+    )
+
+
+def _frames_of(draw: Callable[[Any], None], values: Sequence[Any]) -> list[tuple[bytes, dict[str, Any]]]:
+    """The last picture, as PNG and with its width and text alternative, that is drawn for each value."""
+    global _frames
+    drawn = []
+    for value in values:
+        _frames = []
+        try:
+            draw(value)
+            drawn.append(_frames[-1])
+        finally:
+            _frames = None
+    return drawn
+
+
+def _show_frames(
+    frames: Sequence[tuple[bytes, dict[str, Any]]], name: str, values: Sequence[Any], first: int
+) -> None:
+    """Displays frames below a slider in HTML; where scripts do not run, the first one stays."""
+    encoded = [base64.b64encode(png).decode() for png, _ in frames]
+    about = frames[first][1]
+    page = (
+        f'<figure class="frames"><label style="display: block">{name} <output>{values[first]}</output><br>'
+        f'<input type="range" min="0" max="{len(values) - 1}" value="{first}" style="width: 60%"></label><br>'
+        f'<img alt="{about["alt"]}" width="{about["width"]}" src="data:image/png;base64,{encoded[first]}">'
+        "<script>{ const figure = document.currentScript.parentElement, "
+        f"values = {json.dumps([str(value) for value in values])}, frames = {json.dumps(encoded)}; "
+        "figure.querySelector('input').oninput = (event) => { const at = event.target.value; "
+        "figure.querySelector('output').textContent = values[at]; "
+        "figure.querySelector('img').src = 'data:image/png;base64,' + frames[at]; }; }</script></figure>"
+    )
+    display(
+        {
+            "text/html": page,
+            "image/png": frames[first][0],
+            "text/plain": f"Figure with a slider: {about['alt']}",
+        },
         metadata={"image/png": about},
         raw=True,
     )
@@ -252,22 +318,21 @@ def _show_picture(png: bytes, alt: str) -> None:
 def slider(
     draw: Callable[[Any], None], label: str, values: Sequence[Any], shown: Sequence[Any], unit: str = ""
 ) -> None:
-    """Displays a picture below a slider, or the pictures of a few values in a lesson that is executed to be read.
+    """Displays a picture below a slider. A lesson that is executed to be read holds frames drawn beforehand, for which the slider
+    needs no kernel.
 
     Args:
         draw: Draws the picture for a value, for example with `drawing`.
         label: What the slider changes.
-        values: The values of the slider, in their order.
-        shown: The values whose pictures are stored; the slider starts at the first one.
+        values: The values of the slider, in their order; frames are drawn for at most `_MOST_FRAMES` of them, and for `shown`.
+        shown: The values that must have frames; the slider starts at the first one.
         unit: Unit of the values.
     """
     name = f"{label} ({unit})" if unit else label
     if os.environ.get(STATIC):
-        say(
-            f"*In Jupyter, this cell has a slider for the {name}. Stored here: {', '.join(map(str, shown))}.*"
-        )
-        for value in shown:
-            draw(value)
+        step = -(-len(values) // _MOST_FRAMES)
+        chosen = [value for number, value in enumerate(values) if number % step == 0 or value in shown]
+        _show_frames(_frames_of(draw, chosen), name, chosen, chosen.index(shown[0]))
         return
     import ipywidgets
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import dataclasses
 import functools
 import gc
 import os
@@ -11,15 +12,13 @@ from pathlib import Path
 
 import pytest
 
-if (
-    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-):  # background jobs of a shell ignore SIGINT, and so would the processes that tests start
+# background jobs of a shell ignore SIGINT, and so would the processes that tests start
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports TensorFlow
-os.environ.setdefault(
-    "TF_ENABLE_ONEDNN_OPTS", "1"
-)  # as in `common.backend`, also for tests that import Keras directly
+# as in `common.backend`, also for tests that import Keras directly
+os.environ.setdefault("TF_ENABLE_ONEDNN_OPTS", "1")
 for threads in (
     "TF_NUM_INTRAOP_THREADS",
     "TF_NUM_INTEROP_THREADS",
@@ -27,18 +26,17 @@ for threads in (
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
 ):
-    os.environ.setdefault(
-        threads, "1"
-    )  # two test processes run at a time, and waiting threads would also use CPU time
+    # two test processes run at a time, and waiting threads would also use CPU time
+    os.environ.setdefault(threads, "1")
+# on a busy machine Ray's server may need more than its 30 s to start
+os.environ.setdefault("RAY_gcs_server_port_wait_time_s", "300")
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 SLOW = "--slow"
-TOGETHER = (
-    "paper",
-    "simulator",
-)  # folders whose files share fixtures that take seconds: a process runs all of a folder
+# folders whose files share fixtures that take seconds: a process runs all of a folder
+TOGETHER = ("fitting", "paper", "scoring", "simulator")
 LEFT = pytest.StashKey[int]()
 
 
@@ -47,7 +45,9 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leaves the slow tests out, unless they are asked for, and gives each file or folder to one process."""
+    """Leaves the slow tests out, unless they are asked for, and gives each file or folder to one
+    process.
+    """
     if not config.getoption(SLOW):
         left = {item for item in items if item.get_closest_marker("slow")}
         config.hook.pytest_deselected(items=list(left))
@@ -79,9 +79,11 @@ def pytest_terminal_summary(terminalreporter, config):
 
 @pytest.fixture(scope="module", autouse=True)
 def memory_given_back():
-    """Frees the networks and graphs of a test file, which are reference cycles, and returns their memory to the system.
+    """Frees the networks and graphs of a test file, which are reference cycles, and returns their
+    memory to the system.
 
-    The collector does not look again at what was there before the file: the libraries, of which TensorFlow alone takes half a second.
+    The collector does not look again at what was there before the file: the libraries, of which
+    TensorFlow alone takes half a second.
     """
     gc.freeze()
     yield
@@ -94,8 +96,8 @@ def memory_given_back():
 def narrow_enhancer():
     """Trains the paper's network with 256 units instead of 3,200.
 
-    Tests with it check what is around a network. After each training of the wide one, TensorFlow keeps 130 MB of its weights and
-    moments until the process ends.
+    Tests with it check what is around a network. After each training of the wide one, TensorFlow
+    keeps 130 MB of its weights and moments until the process ends.
     """
     from enhsim_tf.enhancer import candidates
 
@@ -108,7 +110,9 @@ def narrow_enhancer():
 
 @pytest.fixture
 def refused():
-    """`with refused("word"):` asserts that the block raises an `InputError` of one line with the standard form and the words."""
+    """`with refused("word"):` asserts that the block raises an `InputError` of one line with the
+    standard form and the words.
+    """
 
     @contextlib.contextmanager
     def refused(*words: str):
@@ -137,7 +141,9 @@ def pretended(monkeypatch):
 
 @pytest.fixture
 def near():
-    """`found == near(expected)` compares nested results up to the last digits, which depend on the processor."""
+    """`found == near(expected)` compares nested results up to the last digits, which depend on the
+    processor.
+    """
 
     def near(value):
         if isinstance(value, dict):
@@ -147,3 +153,34 @@ def near():
         return pytest.approx(value, rel=1e-9, abs=1e-12) if isinstance(value, float) else value
 
     return near
+
+
+# fitted simulators; what takes long to import is imported when one is asked for
+
+
+@pytest.fixture(scope="session")
+def single():
+    """A simulator of one channel, whose enhancer and noise were chosen, with its report."""
+    from enhsim_tf.fitting.fit import fit
+    from enhsim_tf.fitting.options import FitOptions
+    from tests.fitted_simulators import WINDOW, series
+
+    return fit(series(), options=FitOptions(window=WINDOW, num_windows=300))
+
+
+@pytest.fixture(scope="session")
+def both():
+    """A simulator of two channels with its report."""
+    from enhsim_tf.fitting.fit import fit
+    from tests.fitted_simulators import QUICK, joint
+
+    return fit(joint(), options=QUICK)
+
+
+@pytest.fixture(scope="session")
+def of_run():
+    """A simulator of a recorded run with its report."""
+    from enhsim_tf.fitting.fit import fit
+    from tests.fitted_simulators import QUICK, coarse_run, series
+
+    return fit(series(), coarse_run(), dataclasses.replace(QUICK, delay_s=0.0))

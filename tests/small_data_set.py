@@ -1,4 +1,5 @@
-"""A command that makes a data set without networks. The tests interrupt it, kill it, limit its resources and start it twice.
+"""A command that makes a data set without networks. The tests interrupt it, kill it, limit its
+resources and start it twice.
 
 Its simulator is a coarse one with white noise, so that it starts in a second.
 """
@@ -13,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
+from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate  # noqa: E402
 from enhsim_tf.datasets.labelled_windows import Plan, ShardMaker  # noqa: E402

@@ -1,14 +1,19 @@
-"""Options and help texts of the commands for a user's own telemetry. This module imports nothing slow."""
+"""Options and help texts of the commands for a user's own telemetry. This module imports nothing
+slow.
+"""
 
 import argparse
-import textwrap
 from pathlib import Path
 
 from enhsim_tf import __version__
+from enhsim_tf.cli.fields import Parser as AnyParser
+from enhsim_tf.cli.fields import add_options
 from enhsim_tf.common.console import Parser
-from enhsim_tf.detection import registry
-from enhsim_tf.simulator.options import FitOptions, ScoreOptions, add_options
-from enhsim_tf.telemetry.registry import SOURCES
+from enhsim_tf.datasets.options import InjectOptions
+from enhsim_tf.fitting.options import FitOptions
+from enhsim_tf.scoring.options import ScoreOptions
+from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.source_kinds import SOURCES
 
 EXAMPLES = """\
 from telemetry to scores:
@@ -16,19 +21,19 @@ from telemetry to scores:
   enhsim-tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
   enhsim-tf score models new.csv --out scores.parquet
 
-with simulator.csv, a recorded run of your own simulator at the times of the telemetry (docs/own_simulator.md):
+with simulator.csv, a recorded run of your own simulator at the times of the telemetry
+(docs/own_simulator.md):
   enhsim-tf fit telemetry.csv --coarse simulator.csv --out models
   enhsim-tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
 
-enhsim-tf fit --help shows the options of fit; generate, verify, score, update and inject have help texts too. A separate command,
-python -m enhsim_tf.reproduce, reproduces the paper.
+enhsim-tf fit --help shows the options of fit; generate, verify, score, update and inject have help
+texts too. A separate command, python -m enhsim_tf.reproduce, reproduces the paper.
 """
-DETECTORS = tuple(map(registry.option_name, (registry.RESIDUAL, *registry.DETECTORS)))
-EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
-_OWN, _MODELS = (
-    "your own simulator",
-    "output folder of `fit`",
-)  # the title of a group of options, and the help text of MODEL_DIR
+EXIT = (
+    "exit code: 0 success; 2 the input or an option is invalid, or at least one of several "
+    "channels failed; 130 interrupted"
+)
+_OWN = "your own simulator"  # the title of a group of options
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -42,7 +47,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """
     parser = Parser(
         prog="enhsim-tf",
-        description="Fits simulators to channels of telemetry, generates labelled training data with them, and scores new telemetry.",
+        description="Fits simulators to channels of telemetry, generates labelled training data "
+        "with them, and scores new telemetry.",
         epilog=EXAMPLES + EXIT,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -76,9 +82,10 @@ def _add_fit(commands: argparse._SubParsersAction) -> None:
         commands,
         "fit",
         "fit an enhanced simulator to nominal telemetry",
-        "Fits an enhanced simulator to the channels of nominal telemetry. The coarse simulator of a channel is a square wave, or the\n"
-        "commands in an array of 25 or 55 columns, or a constant level if nothing is periodic. The last part of the telemetry is held out, and the\n"
-        "report evaluates the simulator on it.",
+        "Fits an enhanced simulator to the channels of nominal telemetry. The coarse simulator of "
+        "a channel is a square wave, or a\n"
+        "constant level if nothing is periodic. The last part of the telemetry is held out, and "
+        "the report evaluates the simulator on it.",
     )
     _add_source(fit)
     fit.add_argument(
@@ -97,7 +104,8 @@ def _add_fit(commands: argparse._SubParsersAction) -> None:
     _add_workers(fit, "with --separately: channels fitted in parallel")
     coarse = fit.add_argument_group(
         _OWN,
-        "fit with a recorded run of your simulator at the times of the telemetry (docs/own_simulator.md)",
+        "fit with a recorded run of your simulator at the times of the telemetry "
+        "(docs/own_simulator.md)",
     )
     _add_coarse(coarse)
     _add_repeated(
@@ -107,7 +115,7 @@ def _add_fit(commands: argparse._SubParsersAction) -> None:
     )
     add_options(coarse, FitOptions, "delay_s")
     _add_json(fit)
-    _add_seed(fit)
+    add_options(fit, FitOptions, "seed")
 
 
 def _add_generate(commands: argparse._SubParsersAction) -> None:
@@ -115,12 +123,15 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
         commands,
         "generate",
         "generate labelled training data",
-        "Generates windows or one continuous series. Labels mark exactly the samples that a degraded mode has changed, and give\n"
+        "Generates windows or one continuous series. Labels mark exactly the samples that a "
+        "degraded mode has changed, and give\n"
         "the scenario (nominal or the mode), its severity, onset and end.",
-        "degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1. The onset is the start\n"
-        "of the degraded mode as a share of the window or series (default: 0.25). A channel without times counts as one sample per second.\n",
+        "degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from "
+        "0 to 1. The onset is the start\n"
+        "of the degraded mode as a share of the window or series (default: 0.25). A channel "
+        "without times counts as one sample per second.\n",
     )
-    generate.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
+    _add_models(generate)
     how_many = generate.add_mutually_exclusive_group()
     how_many.add_argument("--windows", type=int, metavar="N", help="total number of windows")
     how_many.add_argument(
@@ -133,18 +144,16 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
         metavar="TIME",
         help="start of the series, such as 2024-01-01 (default: times are seconds from 0)",
     )
-    what = "a degraded mode, such as stuck:0.5, of all channels or of one; for ranges such as stuck:0.2-0.8:0.1-0.9, each window draws its own"
+    what = (
+        "a degraded mode, such as stuck:0.5, of all channels or of one; for ranges such as "
+        "stuck:0.2-0.8:0.1-0.9, each window draws its own"
+    )
     _add_repeated(generate, "--scenario", what, "[CHANNEL=]MODE:SEVERITY[:ONSET]", [])
     series = generate.add_argument_group(
         "events in a series", "with --continuous; each event is followed by nominal operation"
     )
-    series.add_argument(
-        "--number",
-        type=int,
-        metavar="N",
-        help="number of events at random places; the scenarios are used in turn",
-    )
-    _add_events(series, "event", "MODE", "stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h")
+    add_options(series, InjectOptions, "number", "at", "length")
+    _add_timeeval(series)
     generate.add_argument(
         "--nominal-share",
         type=float,
@@ -170,7 +179,7 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
         "with these options, OUT is a folder of many files (docs/large_data_sets.md)",
     )
     _add_workers(large, "number of worker processes", None)
-    _add_seed(generate)
+    add_options(generate, FitOptions, "seed")
 
 
 def _add_verify(commands: argparse._SubParsersAction) -> None:
@@ -178,35 +187,25 @@ def _add_verify(commands: argparse._SubParsersAction) -> None:
     verify.add_argument(
         "folder", type=Path, metavar="FOLDER", help="output folder of `generate --workers`"
     )
-    verify.set_defaults(seed=0)
 
 
 def _add_score(commands: argparse._SubParsersAction) -> None:
     score = _command(
         commands,
         "score",
-        "score telemetry with a detector that has learnt from generated telemetry",
-        "Writes a score and a flag for each sample of the source. Beside SCORES it writes the alarms, one per row, to a file that ends in\n"
-        ".events.csv: begin, end, peak, duration_s, num_flagged, score, confidence, and against: what was learnt, or the new operating point\n"
-        "after a lasting departure. Flagged samples at most one window apart form one alarm. The threshold\n"
-        "never flags more of the nominal telemetry of the fit than it is set for.",
-        textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
-        + "\nresidual and innovation judge the difference between the telemetry and the simulator (docs/own_data.md)\n",
+        "score telemetry by how it differs from nominal telemetry",
+        "Writes a score and a flag for each sample of the source. Beside SCORES it writes the "
+        "alarms, one per row, to a file that ends in\n"
+        ".events.csv: begin (the estimated onset), end, detected (when a scorer that has seen only "
+        "the past raises it), peak, duration_s,\n"
+        "num_flagged, score, confidence, against (what was learnt, or the new operating point "
+        "after a lasting departure), and the\n"
+        "views and channels that raised it. The threshold never flags more of the nominal "
+        "telemetry of the fit than it is set for.",
     )
-    score.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
+    _add_models(score)
     _add_source(score)
-    what = "detector (default: the one that `fit` chose by held-out time)"
-    score.add_argument("--detector", choices=DETECTORS, metavar="NAME", help=what)
     add_options(score, ScoreOptions, "false_alarm_rate")
-    what = "generated windows from which the detector learns (default: %(default)s)"
-    score.add_argument(
-        "--windows",
-        dest="num_windows",
-        type=int,
-        default=ScoreOptions.num_windows,
-        metavar="N",
-        help=what,
-    )
     _add_coarse(
         score.add_argument_group(
             _OWN, "score the difference between the telemetry and the enhanced run"
@@ -225,7 +224,6 @@ def _add_score(commands: argparse._SubParsersAction) -> None:
         help="a .parquet or .csv file; a folder for several simulators",
     )
     _add_json(score)
-    _add_seed(score)
 
 
 def _add_update(commands: argparse._SubParsersAction) -> None:
@@ -233,10 +231,12 @@ def _add_update(commands: argparse._SubParsersAction) -> None:
         commands,
         "update",
         "update simulators with newer nominal telemetry",
-        "Fits the simulators again to newer nominal telemetry, and reports what changed, with errors and alarms of the old and the new\n"
-        "simulator on the held-out end of the new telemetry (docs/own_data.md). The old simulators are kept.",
+        "Fits the simulators again to newer nominal telemetry, and reports what changed, with "
+        "errors and alarms of the old and the new\n"
+        "simulator on the held-out end of the new telemetry (docs/own_data.md). The old simulators "
+        "are kept.",
     )
-    update.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
+    _add_models(update)
     _add_source(update)
     _add_coarse(update.add_argument_group(_OWN, "for simulators that were fitted with --coarse"))
     update.add_argument(
@@ -252,7 +252,7 @@ def _add_update(commands: argparse._SubParsersAction) -> None:
     )
     add_options(update, FitOptions, "held_out")
     _add_json(update)
-    _add_seed(update)
+    add_options(update, FitOptions, "seed")
 
 
 def _add_inject(commands: argparse._SubParsersAction) -> None:
@@ -260,27 +260,16 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
         commands,
         "inject",
         "put labelled anomalies into nominal telemetry",
-        "Puts anomalies into nominal telemetry of your own, at random or given places, and writes it with labels (docs/inject.md).",
-        "kinds: spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain, of each channel on its own;\n"
+        "Puts anomalies into nominal telemetry of your own, at random or given places, and writes "
+        "it with labels (docs/inject.md).",
+        "kinds: spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain, of "
+        "each channel on its own;\n"
         "another_time, delay, lost_coupling, common_shift, of several channels in one table\n",
     )
     _add_source(inject)
-    inject.add_argument(
-        "--kinds",
-        metavar="KIND,...",
-        help="kinds of anomaly at random places, or all; they are used in turn",
-    )
-    inject.add_argument(
-        "--number",
-        type=int,
-        metavar="N",
-        help="number of anomalies at random places (default: one of each kind)",
-    )
-    severity = "severity in standard deviations of the noise, or a range (default: 4)"
-    inject.add_argument("--severity", metavar="SD[:SD]", help=severity)
-    noise = "standard deviation of the noise (default: estimated from second differences)"
-    inject.add_argument("--noise-sd", type=float, metavar="SD", help=noise)
-    _add_events(inject, "anomaly", "KIND", "ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h")
+    names = "kinds", "number", "severity", "noise_sd", "at", "length"
+    add_options(inject, InjectOptions, *names)
+    _add_timeeval(inject)
     inject.add_argument(
         "--figure",
         action="store_true",
@@ -293,48 +282,46 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
         metavar="OUT",
         help="a .parquet or .csv file; a folder: a file per channel",
     )
-    _add_seed(inject)
+    _add_quiet(inject)
+    add_options(inject, InjectOptions, "seed")
 
 
 # options of several commands
 
-_Parser = argparse.ArgumentParser | argparse._ArgumentGroup
-
 
 def _add_repeated(
-    parser: _Parser, word: str, text: str, metavar: str = "NAME", default: list[str] | None = None
+    parser: AnyParser, word: str, text: str, metavar: str = "NAME", default: list[str] | None = None
 ) -> None:
     parser.add_argument(
         word, action="append", default=default, metavar=metavar, help=f"{text}; may be repeated"
     )
 
 
-def _add_json(parser: _Parser) -> None:
+def _add_models(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
+
+
+def _add_json(parser: AnyParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object in place of lines of text"
     )
+    _add_quiet(parser)
 
 
-def _add_seed(parser: _Parser) -> None:
-    parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
+def _add_quiet(parser: AnyParser) -> None:
+    parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
 
 
-def _add_workers(parser: _Parser, text: str, engine: str | None = "local") -> None:
+def _add_workers(parser: AnyParser, text: str, engine: str | None = "local") -> None:
     parser.add_argument("--workers", metavar="auto|N", help=f"{text} (default: auto, one per core)")
-    where = "run workers on this machine (default) or with Ray, on the cluster at RAY_ADDRESS (docs/large_data_sets.md)"
+    where = (
+        "run workers on this machine (default) or with Ray, on the cluster at RAY_ADDRESS "
+        "(docs/large_data_sets.md)"
+    )
     parser.add_argument("--engine", choices=("local", "ray"), default=engine, help=where)
 
 
-def _add_events(parser: _Parser, noun: str, form: str, examples: str) -> None:
-    _add_repeated(
-        parser,
-        "--at",
-        f"an {noun} at a given sample or time, such as {examples}",
-        f"{form}[:SEVERITY]@BEGIN/LENGTH",
-        [],
-    )
-    length = "length at random places: samples, a time such as 10min, or a range (default: 100)"
-    parser.add_argument("--length", default="100", metavar="N[:N]", help=length)
+def _add_timeeval(parser: AnyParser) -> None:
     parser.add_argument(
         "--timeeval",
         action="store_true",
@@ -347,59 +334,29 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     _add_repeated(parser, "--column", "only this column (default: all numeric columns)")
     time = "the time column (default: detected); give 'none' to use the sample number as the time"
     parser.add_argument("--time", metavar="NAME", help=time)
-    parser.add_argument(
-        "--interval",
-        type=float,
-        metavar="SECONDS",
-        help="sampling interval (default: the most frequent one)",
-    )
+    add_options(parser, Cleaning, "interval_s")
     table = parser.add_argument_group(
-        "tables in other forms", "what is detected unless it is given (docs/own_data.md)"
+        "tables in other forms", "what is detected unless it is given (docs/forms.md)"
     )
-    _add_repeated(table, "--label-column", "column that labels anomalous rows, or 'none'")
-    _add_repeated(
-        table, "--series-column", "column whose values tell several series apart, or 'none'"
-    )
-    table.add_argument(
-        "--no-header",
-        action="store_true",
-        help="the file has no line of names: columns are 'column 0', 'column 1', ...",
-    )
-    table.add_argument(
-        "--decimal", choices=(".", ","), help="decimal sign; the other one separates thousands"
-    )
+    names = "label_column", "series_column", "no_header", "skip_rows", "table", "states", "decimal"
+    add_options(table, Cleaning, *names)
     _add_cleaning(parser)
 
 
-def _add_coarse(parser: _Parser) -> None:
+def _add_coarse(parser: AnyParser) -> None:
     parser.add_argument(
         "--coarse", metavar="SOURCE", help="recorded run of the simulator: " + SOURCES
     )
     parser.add_argument(
         "--coarse-time", metavar="NAME", help="the time column of that run (default: detected)"
     )
-    start = "time in UTC of the zero of that run, such as 2024-03-01T00:00:00, if its times count from zero"
+    start = (
+        "time in UTC of the zero of that run, such as 2024-03-01T00:00:00, if its times count from "
+        "zero"
+    )
     parser.add_argument("--coarse-start", metavar="TIME", help=start)
 
 
-def _add_cleaning(parser: _Parser) -> None:
-    form = (
-        "how times are written: a format such as %%d.%%m.%%Y, or for numbers s, ms, us, ns, min, h, D, excel, mjd, jd, datenum "
-        "(default: detected)"
-    )
-    parser.add_argument("--time-format", metavar="FORMAT", help=form)
-    missing = "values that mean 'no value', such as --missing-values=-999.9"
-    parser.add_argument(
-        "--missing-values", action="append", default=[], metavar="VALUE,...", help=missing
-    )
-    zone = "time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
-    parser.add_argument("--timezone", metavar="ZONE", help=zone)
-    most = "longest gap, in samples, that is filled (default: 5; any with --fill hold)"
-    parser.add_argument("--max-fill", type=int, metavar="N", help=most)
-    fill = "fill gaps by straight lines (default), or hold the last value, for telemetry that is sent only when it changes"
-    parser.add_argument("--fill", choices=("linear", "hold"), default="linear", help=fill)
-    parser.add_argument(
-        "--drop-bad",
-        action="store_true",
-        help="drop and count values and times that cannot be read, instead of stopping",
-    )
+def _add_cleaning(parser: AnyParser) -> None:
+    names = "time_format", "missing_values", "timezone", "max_fill", "fill", "drop_bad"
+    add_options(parser, Cleaning, *names)

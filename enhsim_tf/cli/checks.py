@@ -1,40 +1,49 @@
-"""Checks of the options of each command, and of whether their files exist. They come before the imports of the command, which are slow."""
+"""Checks of the options of each command, and of whether their files exist. They come before the
+imports of the command, which are slow.
+"""
 
 import argparse
+import dataclasses
 
+from enhsim_tf.cli.fields import options_from
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.options import flag_of
 from enhsim_tf.common.parallel.engines import parse_workers
-from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
-from enhsim_tf.simulator.options import FitOptions, ScoreOptions, option_of, options_from
+from enhsim_tf.datasets.options import (
+    MOST_EVENTS,
+    WITHOUT_SEVERITY,
+    InjectOptions,
+    split_limits,
+)
+from enhsim_tf.fitting.options import FitOptions
+from enhsim_tf.scoring.options import ScoreOptions
 from enhsim_tf.telemetry.cleaning.options import Cleaning
-from enhsim_tf.telemetry.registry import existing
+from enhsim_tf.telemetry.source_kinds import existing
 
+_CHOSEN = {"score": ScoreOptions, "inject": InjectOptions}  # of others the `FitOptions`
 _OF_RUNS = "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values"
 _NOT_OF_RUNS = (
     "windows continuous start scenario at number timeeval nominal_share workers engine".split()
 )
-_MOST_EVENTS = 10_000
 
 
 def check(options: argparse.Namespace) -> argparse.Namespace:
-    """Checks the options of a command, and replaces texts by what they say, such as `options.scenario` by a list of `ScenarioRange`.
+    """Checks the options of a command, and replaces texts by what they say, such as
+    `options.scenario` by a list of `ScenarioRange`.
 
     Raises:
-        InputError: If a value is out of range, options contradict each other, or there is no such source or simulator.
+        InputError: If a value is out of range, options contradict each other, or there is no such
+            source or simulator.
     """
-    if not 0 <= options.seed < 2**31:
-        raise InputError(
-            f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}."
-        )
-    checks = {
-        "fit": _check_fit,
-        "generate": _check_generate,
-        "score": _check_score,
-        "update": _check_update,
-        "inject": _check_inject,
-    }
-    if options.command in checks:
-        checks[options.command](options)
+    command = options.command
+    if command != "verify":
+        options.chosen = options_from(options, _CHOSEN.get(command, FitOptions))
+        more = {"fit": _check_fit, "generate": _check_generate, "inject": _check_inject}
+        if command in more:
+            more[command](options)
+        least = {"fit": getattr(options, "window", None) or 32, "inject": 3}.get(command, 2)
+        labelled = "missing" if command in ("fit", "update") else "keep"
+        options.cleaning = cleaning_options(options, least, labelled)
     for source in (getattr(options, "source", None), getattr(options, "coarse", None)):
         if source is not None:
             existing(source)
@@ -46,61 +55,24 @@ def check(options: argparse.Namespace) -> argparse.Namespace:
 
 
 def _check_fit(options: argparse.Namespace) -> None:
-    options.chosen = options_from(options, FitOptions)
     if options.coarse is None:
         _refuse(
             options, "without --coarse", "coarse_time", "coarse_start", "coarse_column", "delay_s"
         )
     options.workers = parse_workers(options.workers, options.engine)
-    options.cleaning = cleaning_options(options, options.window or 32, "missing")
-
-
-def _check_score(options: argparse.Namespace) -> None:
-    named = {option_name(name): name for name in (RESIDUAL, *DETECTORS)}
-    options.chosen = ScoreOptions(
-        named.get(options.detector), options.num_windows, options.false_alarm_rate, options.seed
-    )
-    options.cleaning = cleaning_options(options, 2)
-
-
-def _check_update(options: argparse.Namespace) -> None:
-    FitOptions(held_out=options.held_out, seed=options.seed)  # checks both
-    options.cleaning = cleaning_options(options, 2, "missing")
 
 
 def _check_inject(options: argparse.Namespace) -> None:
-    from enhsim_tf.datasets.places import INJECTIONS, WITHOUT_SEVERITY, InjectOptions, split_limits
-
-    kinds = (
-        tuple(INJECTIONS)
-        if options.kinds == "all"
-        else tuple(filter(None, (options.kinds or "").split(",")))
-    )
-    least, greatest = split_limits("severity", options.severity or "4")
-    try:
-        severity = float(least), float(greatest)
-    except ValueError:
-        raise InputError(
-            f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}."
-        ) from None
-    length = split_limits("length", options.length)
-    options.chosen = InjectOptions(
-        kinds, severity, length, options.number, tuple(options.at), options.noise_sd, options.seed
-    )
-    if set(kinds) <= set(WITHOUT_SEVERITY) and not options.at:
+    if set(options.chosen.kinds) <= set(WITHOUT_SEVERITY) and not options.at:
         _refuse(
             options,
             f"with {options.kinds}: of the kinds of several channels, common_shift alone has one",
             "severity",
         )
-    options.cleaning = cleaning_options(options, 3)
 
 
 def _check_generate(options: argparse.Namespace) -> None:
-    options.cleaning, options.is_large = (
-        cleaning_options(options, 2),
-        bool(options.workers or options.engine),
-    )
+    options.is_large = bool(options.workers or options.engine)
     if options.coarse is not None:
         _refuse(
             options, "with --coarse, because the run gives length, times and labels", *_NOT_OF_RUNS
@@ -137,29 +109,30 @@ def _check_generate(options: argparse.Namespace) -> None:
 
 
 def _check_series(options: argparse.Namespace) -> None:
-    from enhsim_tf.coarse_simulator.degraded import Degraded
-    from enhsim_tf.datasets.places import parse_length, parse_place, parse_start, split_limits
+    from enhsim_tf.coarse.degraded import Degraded
+    from enhsim_tf.datasets.places import parse_length, parse_place, parse_start
 
     if options.number is None and (len(options.scenario) > 1 or (options.scenario and options.at)):
         raise InputError(
-            "Expected --number, of events at drawn places, with several --scenario in a series, or with --scenario and --at. Received: none."
+            "Expected --number, of events at drawn places, with several --scenario in a series, or "
+            "with --scenario and --at. Received: none."
         )
-    if options.number is not None and not (
-        1 <= options.number <= _MOST_EVENTS and options.scenario
-    ):
+    if options.number is not None and not (1 <= options.number <= MOST_EVENTS and options.scenario):
         raise InputError(
-            f"Expected --number from 1 to {_MOST_EVENTS:,}, with --scenario. Received: --number {options.number}."
+            f"Expected --number from 1 to {MOST_EVENTS:,}, with --scenario. Received: --number "
+            f"{options.number}."
         )
     for scenario in options.scenario if options.number is not None else ():
         if scenario.channel is not None or scenario.onset[0] < scenario.onset[1]:
             raise InputError(
-                f"Expected only MODE:SEVERITY with --number, whose events have drawn places in all channels. Received: {scenario} with a channel "
+                "Expected only MODE:SEVERITY with --number, whose events have drawn places in all "
+                f"channels. Received: {scenario} with a channel "
                 "or a range of onsets. Leave it out."
             )
-    options.at = [parse_place(text, 1.0) for text in options.at]
+    options.at = [parse_place(text, 1.0) for text in options.at or ()]
     for place in options.at:
         Degraded(place.kind, place.severity)  # checks both
-    options.length = split_limits("length", options.length)
+    options.length = split_limits(options.length or "100")
     options.start = None if options.start is None else parse_start(options.start)
     parse_length(options.continuous)
 
@@ -169,21 +142,16 @@ def _refuse(options: argparse.Namespace, when: str, *names: str) -> None:
     for name in names:
         if getattr(options, name) not in (None, [], False):
             raise InputError(
-                f"Expected no {option_of(name)} {when}. Received: {option_of(name)}. Leave it out."
+                f"Expected no {flag_of(name)} {when}. Received: {flag_of(name)}. Leave it out."
             )
 
 
 def cleaning_options(
     options: argparse.Namespace, min_part: int, labelled: str = "keep"
 ) -> Cleaning:
-    """Returns the settings of reading and cleaning that the options of a command give, with the arguments as `Cleaning` has them."""
-    same = "label_column series_column no_header decimal time_format timezone max_fill fill drop_bad".split()
-    return Cleaning(
-        **{name: getattr(options, name) for name in same if hasattr(options, name)},
-        interval_s=getattr(options, "interval", None),
-        labelled=labelled,
-        missing_values=tuple(
-            value for values in options.missing_values for value in values.split(",")
-        ),
-        min_part=min_part,
-    )
+    """Returns the settings of reading and cleaning that the options of a command give, with the
+    arguments as `Cleaning` has them.
+    """
+    given = [value for values in options.missing_values or () for value in values.split(",")]
+    cleaning = options_from(options, Cleaning)
+    return dataclasses.replace(cleaning, labelled=labelled, missing_values=given, min_part=min_part)

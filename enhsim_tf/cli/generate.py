@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.cli.options import for_each, output_paths, refuse_same_file
-from enhsim_tf.coarse_simulator.recording_files import read_recording
+from enhsim_tf.cli.shared import for_each, output_paths, read_run, refuse_same_file
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import counted, printable
 from enhsim_tf.datasets.generate import generate_data_set
@@ -15,18 +14,18 @@ from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
 from enhsim_tf.datasets.labelled_series import draw_schedule, series_index, series_labelled
 from enhsim_tf.datasets.labelled_windows import make_plan, write_windows
 from enhsim_tf.datasets.places import length_limits, parse_num_samples
+from enhsim_tf.scoring.trusted_range import TrustedRange
 from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.simulator.trusted_range import TrustedRange
 from enhsim_tf.telemetry.placing import PlacedEvent
 
 
 def run_generate(options: argparse.Namespace) -> int:
-    """Generates labelled training data with the simulator of each channel and returns the exit code."""
-    is_series, models = (
-        options.continuous is not None,
-        chosen_of(models_of(options.models), options.channel),
-    )
+    """Generates labelled training data with the simulator of each channel and returns the exit
+    code.
+    """
+    is_series = options.continuous is not None
+    models = chosen_of(models_of(options.models), options.channel)
     if options.is_large:
         paths = {
             name: options.out if len(models) == 1 else folder_of(options.out, name)
@@ -63,14 +62,13 @@ def run_generate(options: argparse.Namespace) -> int:
             else:
                 write_windows(paths[name], plan, simulator)
         tell(f"{printable(name)}: {what} in {paths[name]}")
-        trusted, rng = (
-            TrustedRange(simulator) if options.scenario else None,
-            np.random.default_rng(options.seed),
-        )
+        trusted = TrustedRange(simulator) if options.scenario else None
+        rng = np.random.default_rng(options.seed)
         for scenario in options.scenario:
             share = trusted.share_outside(*(scenario.draw(rng) for _ in range(200)))
             tell(
-                f"{printable(name)}: {scenario}: {share:.0%} of such windows are outside its enhancer's training range"
+                f"{printable(name)}: {scenario}: {share:.0%} of such windows are outside its "
+                "enhancer's training range"
             )
 
     return for_each(models, generate)
@@ -78,18 +76,14 @@ def run_generate(options: argparse.Namespace) -> int:
 
 def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, path: Path) -> str:
     """Writes a labelled series and returns what is said of it."""
-    interval_s, rng, scenario, schedule = (
-        simulator.interval_s,
-        np.random.default_rng([options.seed, 3]),
-        None,
-        [],
-    )
+    interval_s = simulator.interval_s
+    rng = np.random.default_rng([options.seed, 3])
+    scenario = None
+    schedule = []
     length = parse_num_samples(options.continuous, interval_s)
     if options.at or options.number:
-        index, lengths = (
-            series_index(length, interval_s, options.start),
-            length_limits(options.length, interval_s),
-        )
+        index = series_index(length, interval_s, options.start)
+        lengths = length_limits(options.length, interval_s)
         given = [
             PlacedEvent(place.kind, place.severity, *place.samples(index, interval_s))
             for place in options.at
@@ -110,20 +104,17 @@ def _write_series(options: argparse.Namespace, simulator: EnhancedSimulator, pat
 def _write_copies(
     options: argparse.Namespace, name: str, model: EnhancedSimulator, path: Path
 ) -> str:
-    """Writes copies of a recorded run of the user's own simulator and returns what is said of them."""
-    copies, runs = 1 if options.copies is None else options.copies, model.recorded_runs()
-    run = read_recording(
-        options.coarse,
-        runs.columns,
-        options.coarse_time,
-        options.cleaning,
-        model.interval_s,
-        options.coarse_start,
-    )
+    """Writes copies of a recorded run of the user's own simulator and returns what is said of
+    them.
+    """
+    copies = 1 if options.copies is None else options.copies
+    run = read_run(options, model.alignment.columns, options.cleaning, model.interval_s)
     num_rows = write_copies(path, model, run, copies, options.seed)
     lines = [*run.notes, *coverage_lines(model, run)]
-    if runs.delay_s:
-        lines.append(f"times are those of the telemetry, {runs.delay_s:g} s after those of the run")
+    delay_s = model.alignment.delay_s
+    if delay_s:
+        lines.append(f"times are those of the telemetry, {delay_s:g} s after those of the run")
     for line in lines:
         tell(f"{printable(name)}: {line}")
-    return f"{counted(copies, 'copy')} of {counted(num_rows // copies, 'sample')}, one every {model.interval_s:g} s,"
+    samples = counted(num_rows // copies, "sample")
+    return f"{counted(copies, 'copy')} of {samples}, one every {model.interval_s:g} s,"

@@ -2,43 +2,81 @@
 
 import os
 import re
-from collections.abc import Sequence
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-_MAX_CHARACTERS, _END = (
-    600,
-    150,
-)  # a longer message loses its middle; its last 150 characters, which say what to do, stay
+# a longer message loses its middle; its last 150 characters, which say what to do, stay
+_MAX_CHARACTERS = 600
+_END = 150
+_MOST_OPTIONS = 6  # in a message
+MANY = 8
+"""Channels, above which a line of a report names only as many, and what is alike is said once."""
+# options whose names differ
+_WORDS = {"interval_s": "interval", "columns": "column", "start": "coarse_start"}
+_SEARCHED = 4_000  # characters at each end that are searched for secrets, before it is shortened
 _PASSWORD = re.compile(
     r"(?<=//)[^/@\s]*:(?!\d+/)[^@]{0,200}@|(?<![^\s'\"(=])[^@/:\s'\"(=]+:[^@/\s]+@(?=[^\s@]*:\d)"
 )
-"""Matches `user:password@` in a URL, either after `//` or, in an address without a scheme, before `host:port`."""
-_TOKEN, _MIN_TOKEN_CHARACTERS = (
-    "INFLUXDB_V2_TOKEN",
-    8,
-)  # a shorter token may be an ordinary word of a message, so it is not masked
+"""Matches `user:password@` in a URL, either after `//` or, in an address without a scheme, before
+`host:port`.
+"""
+# a shorter token may be an ordinary word of a message, so it is not masked
+_TOKEN = "INFLUXDB_V2_TOKEN"
+_MIN_TOKEN_CHARACTERS = 8
 
 
 class InputError(ValueError):
-    """Raised when input cannot be used. The message says what was expected, what was received and what to do.
+    """Raised when input cannot be used. The message says what was expected, what was received and
+    what to do.
 
-    The message is always one line of printable characters and at most 600 characters long, even where it quotes hostile
-    input. Passwords in URLs and the InfluxDB token are masked with `***`.
+    The message is always one line of printable characters and at most 600 characters long, even
+    where it quotes hostile input. Passwords in URLs and the InfluxDB token are masked with `***`.
 
     Args:
         message: Description of the problem.
+        options: What may be given instead, each as values of options of reading by their names in
+            Python. The message ends with them as a command takes them.
+        otherwise: What else to do, after the options.
     """
 
-    def __init__(self, message: str = ""):
-        line = printable(" ".join(str(message).splitlines()))
-        token = os.environ.get(_TOKEN, "")
-        for form in (
-            (token, repr(token)[1:-1]) if len(token) >= _MIN_TOKEN_CHARACTERS else ()
-        ):  # plain, and escaped by repr()
-            line = line.replace(form, "***")
-        line = _PASSWORD.sub("***@", line)
+    def __init__(
+        self, message: str = "", options: Sequence[Mapping[str, Any]] = (), otherwise: str = ""
+    ):
+        self.message = _one_line(str(message))
+        self.otherwise = otherwise
+        self.options = tuple(map(dict, options))
+        ways = [*map(option_text, self.options[:_MOST_OPTIONS]), *filter(None, [otherwise])]
+        line = _one_line(f"{message} Give {', or '.join(ways)}.") if ways else self.message
         if len(line) > _MAX_CHARACTERS:
             line = f"{line[: _MAX_CHARACTERS - _END - 5]} ... {line[-_END:]}"
         super().__init__(line)
+
+
+def _one_line(text: str) -> str:
+    """Returns a text as one printable line without secrets, and without the middle if it is very
+    long.
+    """
+    if len(text) > 2 * _SEARCHED:
+        text = f"{text[:_SEARCHED]} ... {text[-_SEARCHED:]}"
+    line = printable(" ".join(text.splitlines()))
+    token = os.environ.get(_TOKEN, "")
+    # plain, and escaped by repr()
+    for form in (token, repr(token)[1:-1]) if len(token) >= _MIN_TOKEN_CHARACTERS else ():
+        line = line.replace(form, "***")
+    return _PASSWORD.sub("***@", line)
+
+
+def option_text(option: Mapping[str, Any]) -> str:
+    """Returns options of reading as a command takes them, such as `--time-format us`."""
+    words = []
+    for name, given in option.items():
+        word = f"--{_WORDS.get(name, name).replace('_', '-')}"
+        for value in given if isinstance(given, list | tuple) else [given]:
+            text = value if isinstance(value, str) else repr(value)
+            joint = "=" if text.startswith("-") else " "
+            words.append(word if value is True else f"{word}{joint}{shlex.quote(text)}")
+    return " ".join(words)
 
 
 def printable(text: str) -> str:
@@ -47,8 +85,16 @@ def printable(text: str) -> str:
 
 
 def spoken(channels: Sequence[str]) -> str:
-    """Returns the channels as a line of a report names them: up to three by their names, more by their number."""
+    """Returns the channels as a line of a report names them: up to three by their names, more by
+    their number.
+    """
     return printable(", ".join(channels) if len(channels) <= 3 else f"{len(channels)} channels")
+
+
+def named(channels: Sequence[str]) -> str:
+    """Returns the names of the first channels, and how many more there are."""
+    more = f" and {len(channels) - MANY:,} more" if len(channels) > MANY else ""
+    return printable(", ".join(channels[:MANY])) + more
 
 
 def counted(number: int, noun: str) -> str:

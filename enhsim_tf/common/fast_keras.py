@@ -1,26 +1,29 @@
-"""What makes training fast: Adam in one operation, Dense layers by blocks, and a convolution with its maximum as one function.
+"""What makes training fast: Adam in one operation, Dense layers by blocks, and a convolution with
+its maximum as one function.
 
-Each gives the numbers of plain Keras up to rounding, and tests compare them; only the masks of dropout are drawn otherwise. Memory
-bandwidth limits a training step of the paper's enhancer (section 2.2) with its 13.7 million weights, and one of its discriminator
-(section 2.3), so each reads and writes less memory.
+Each gives the numbers of plain Keras up to rounding, and tests compare them; only the masks of
+dropout are drawn otherwise. Memory bandwidth limits a training step of the paper's enhancer
+(section 2.2) with its 13.7 million weights, and one of its discriminator (section 2.3), so each
+reads and writes less memory.
 """
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from enhsim_tf.common.backend import keras, tf
 
-# -- Adam as one fused operation -------------------------------------------------------------------------------------------
+# -- Adam as one fused operation -----------------------------------------------------------------
 #
 #     m += (1 - beta_1) * (g - m)      v += (1 - beta_2) * (g^2 - v)
 #     w -= learning_rate * sqrt(1 - beta_2^t) / (1 - beta_1^t) * m / (sqrt(v) + epsilon)
 #
-# In Keras, these are about ten operations, each of which reads and writes arrays of the weights' size. TensorFlow's fused operation
-# computes 1 - beta_2 from beta_2 in float32, which for 0.999 gives 0.001 times 0.99998713. That scales v, for which the learning rate
-# and epsilon are corrected.
+# In Keras, these are about ten operations, each of which reads and writes arrays of the weights'
+# size. TensorFlow's fused operation computes 1 - beta_2 from beta_2 in float32, which for 0.999
+# gives 0.001 times 0.99998713. That scales v, for which the learning rate and epsilon are
+# corrected.
 
 
 class AdamStep(NamedTuple):
@@ -33,7 +36,9 @@ class AdamStep(NamedTuple):
 
 
 def adam_step(adam: keras.optimizers.Adam, learning_rate: tf.Tensor | None = None) -> AdamStep:
-    """Computes the scalars of the optimiser's next step, with its own learning rate if none is given."""
+    """Computes the scalars of the optimiser's next step, with its own learning rate if none is
+    given.
+    """
     rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
     step = tf.cast(adam.iterations + 1, tf.float32)
     rate = adam.learning_rate if learning_rate is None else learning_rate
@@ -49,7 +54,9 @@ def apply_adam(
     gradient: tf.Tensor,
     step: AdamStep,
 ) -> tf.Operation:
-    """Updates a variable and its two moments. It does not advance the optimiser's iteration counter."""
+    """Updates a variable and its two moments. It does not advance the optimiser's iteration
+    counter.
+    """
     return tf.raw_ops.ResourceApplyAdam(
         var=weight.handle,
         m=momentum.handle,
@@ -67,15 +74,17 @@ def apply_adam(
 def fused_adam(
     learning_rate: float | keras.optimizers.schedules.LearningRateSchedule,
 ) -> keras.optimizers.Adam:
-    """Creates a Keras Adam optimiser that updates each variable by one fused operation, and is in all else standard."""
+    """Creates a Keras Adam optimiser that updates each variable by one fused operation, and is in
+    all else standard.
+    """
     adam = keras.optimizers.Adam(learning_rate)
 
     def update_step(gradient: tf.Tensor, variable: tf.Variable, learning_rate: tf.Tensor) -> None:
         index = adam._get_variable_index(variable)
         # the fused operation needs the handles of the TensorFlow variables, which Keras wraps
         held = (
-            getattr(each, "_value", each)
-            for each in (variable, adam._momentums[index], adam._velocities[index])
+            getattr(weights, "_value", weights)
+            for weights in (variable, adam._momentums[index], adam._velocities[index])
         )
         apply_adam(adam, *held, gradient, adam_step(adam, learning_rate))
 
@@ -83,20 +92,24 @@ def fused_adam(
     return adam
 
 
-# -- Dense layers by blocks ------------------------------------------------------------------------------------------------
+# -- Dense layers by blocks ----------------------------------------------------------------------
 #
-# The enhancer's widest kernel has 10.24 million weights, or 41 MB. Keras computes the gradient of the whole kernel, writes it to memory,
-# and reads it again for the update. However, the gradient of a Dense kernel is a product of two small matrices, so that any block of its
-# rows can be computed when it is needed. For one block after the other:
+# The enhancer's widest kernel has 10.24 million weights, or 41 MB. Keras computes the gradient of
+# the whole kernel, writes it to memory, and reads it again for the update. However, the gradient of
+# a Dense kernel is a product of two small matrices, so that any block of its rows can be computed
+# when it is needed. For one block after the other:
 #
-#     the gradient of the layer's inputs     below = upstream @ block^T         with the weights before the update
-#     the gradient of the block              gradient = inputs[:, rows]^T @ upstream
-#     Adam's update of the block             `apply_adam`
+#     the gradient of the layer's inputs  below = upstream @ block^T, with the weights before
+#     the gradient of the block           gradient = inputs[:, rows]^T @ upstream
+#     Adam's update of the block          `apply_adam`
 #
-# The block and its gradient are still in the processor's cache when the update reads them. Only the order of summation differs.
+# The block and its gradient are still in the processor's cache when the update reads them. Only the
+# order of summation differs.
 
 BLOCK_BYTES = 5_200_000
-"""Maximum size of a block. A few blocks of this size, with their moments, fit into a processor's cache."""
+"""Maximum size of a block. A few blocks of this size, with their moments, fit into a processor's
+cache.
+"""
 
 
 class _Weight(NamedTuple):
@@ -108,20 +121,21 @@ class _Weight(NamedTuple):
 
 
 def _weight_of(values: np.ndarray) -> _Weight:
-    return _Weight(
-        *(tf.Variable(each) for each in (values, np.zeros_like(values), np.zeros_like(values)))
-    )
+    zeros = np.zeros_like(values)
+    return _Weight(tf.Variable(values), tf.Variable(zeros), tf.Variable(zeros))
 
 
 class _BlockedDense:
     """A Dense layer whose kernel is stored in blocks of rows."""
 
     def __init__(self, layer: keras.layers.Dense):
-        self.layer, self.is_relu = layer, layer.activation is keras.activations.relu
+        self.layer = layer
+        self.is_relu = layer.activation is keras.activations.relu
         kernel, bias = (np.asarray(weight) for weight in (layer.kernel, layer.bias))
         number = math.ceil(kernel.nbytes / BLOCK_BYTES)
         self.blocks = [_weight_of(rows) for rows in np.array_split(kernel, number)]
-        self.bias, self.num_rows = _weight_of(bias), [block.value.shape[0] for block in self.blocks]
+        self.bias = _weight_of(bias)
+        self.num_rows = [block.value.shape[0] for block in self.blocks]
 
     def parts_of(self, inputs: tf.Tensor) -> list[tf.Tensor]:
         """Splits the inputs into the columns by which the individual blocks are multiplied."""
@@ -143,25 +157,30 @@ class _BlockedDense:
         step: AdamStep,
         is_first: bool,
     ) -> tf.Tensor | None:
-        """Updates the weights and returns the gradient of the inputs, or None for the first layer, where it is not needed."""
+        """Updates the weights and returns the gradient of the inputs, or None for the first layer,
+        where it is not needed.
+        """
         if self.is_relu:
             upstream = tf.where(outputs > 0, upstream, 0.0)
-        before, belows = [upstream], []
+        before = [upstream]
+        belows = []
         for part, block in zip(self.parts_of(inputs), self.blocks, strict=True):
-            # process the blocks one after the other; otherwise all gradients would be computed first
+            # process the blocks one after the other; otherwise all gradients would be computed
+            # first
             with tf.control_dependencies(before):
                 gradient = tf.matmul(part, upstream, transpose_a=True)
                 belows += [] if is_first else [tf.matmul(upstream, block.value, transpose_b=True)]
-            with tf.control_dependencies(
-                belows[-1:]
-            ):  # the gradient of the inputs needs the weights before the update
+            # the gradient of the inputs needs the weights before the update
+            with tf.control_dependencies(belows[-1:]):
                 before = [apply_adam(adam, *block, gradient, step)]
         apply_adam(adam, *self.bias, tf.reduce_sum(upstream, axis=0), step)
         return None if is_first else tf.concat(belows, axis=1)
 
 
 class _Stack:
-    """The layers, wrapped in an object that Keras does not inspect, so that their variables are not tracked by the model."""
+    """The layers, wrapped in an object that Keras does not inspect, so that their variables are not
+    tracked by the model.
+    """
 
     def __init__(self, layers: Sequence[keras.layers.Dense]):
         self.layers = [_BlockedDense(layer) for layer in layers]
@@ -175,7 +194,8 @@ class _Stack:
 
 
 class BlockwiseTraining(keras.Model):
-    """A model that is trained instead of a wide stack of Dense layers. After `fit`, `write_back` copies the weights back.
+    """A model that is trained instead of a wide stack of Dense layers. After `fit`, `write_back`
+    copies the weights back.
 
     Args:
         network: A model for which `is_wide_dense_stack` returns True.
@@ -190,14 +210,17 @@ class BlockwiseTraining(keras.Model):
         return self._stack.forward(inputs)[-1]
 
     def train_step(self, data: tuple[tf.Tensor, tf.Tensor]) -> dict[str, tf.Tensor]:
-        """Runs one training step on a batch, from the last layer to the first. Keras calls this method."""
+        """Runs one training step on a batch, from the last layer to the first. Keras calls this
+        method.
+        """
         inputs, targets = data
         activations = self._stack.forward(inputs)
         outputs = activations[-1]
         with tf.GradientTape() as tape:
             tape.watch(outputs)
             loss = self.compute_loss(inputs, targets, outputs)
-        upstream, step = tape.gradient(loss, outputs), adam_step(self.optimizer)
+        upstream = tape.gradient(loss, outputs)
+        step = adam_step(self.optimizer)
         for number, layer in reversed(list(enumerate(self._stack.layers))):
             upstream = layer.update(
                 *activations[number : number + 2], upstream, self.optimizer, step, number == 0
@@ -209,45 +232,77 @@ class BlockwiseTraining(keras.Model):
 
     def write_back(self) -> None:
         """Copies the trained weights to the network."""
-        for each in self._stack.layers:
-            each.layer.set_weights(
+        for dense in self._stack.layers:
+            dense.layer.set_weights(
                 [
-                    np.concatenate([block.value.numpy() for block in each.blocks]),
-                    each.bias.value.numpy(),
+                    np.concatenate([block.value.numpy() for block in dense.blocks]),
+                    dense.bias.value.numpy(),
                 ]
             )
 
 
+def fit_blockwise(
+    network: keras.Sequential,
+    learning_rate: float,
+    loss: str,
+    pairs: keras.utils.PyDataset,
+    **options: Any,
+) -> dict[str, list[float]]:
+    """Trains a wide stack of Dense layers as `compile` with Adam and `fit` of Keras do.
+
+    Args:
+        network: A model for which `is_wide_dense_stack` returns True.
+        learning_rate: Adam's learning rate.
+        loss: Name of the loss.
+        pairs: Batches of inputs and targets.
+        **options: Arguments of `fit`.
+
+    Returns:
+        The history of Keras.
+    """
+    trained = BlockwiseTraining(network)
+    trained.compile(fused_adam(learning_rate), loss, jit_compile=False)
+    history = trained.fit(pairs, **options)
+    trained.write_back()
+    return history.history
+
+
 def is_wide_dense_stack(network: keras.Model) -> bool:
-    """Returns whether a model is a stack of plain relu or linear Dense layers, at least one with a kernel larger than `BLOCK_BYTES`."""
+    """Returns whether a model is a stack of plain relu or linear Dense layers, at least one with a
+    kernel larger than `BLOCK_BYTES`.
+    """
     activations = (keras.activations.relu, keras.activations.linear)
     are_plain = all(
         type(layer) is keras.layers.Dense and layer.use_bias and layer.activation in activations
         for layer in network.layers
     )
-    if (
-        not are_plain or network.losses or len(network.trainable_weights) < len(network.weights)
-    ):  # losses are those of regularisers
+    # losses are those of regularisers
+    if not are_plain or network.losses or len(network.trainable_weights) < len(network.weights):
         return False
     return any(math.prod(layer.kernel.shape) * 4 > BLOCK_BYTES for layer in network.layers)
 
 
-# -- Convolution with its maximum ------------------------------------------------------------------------------------------
+# -- Convolution with its maximum ----------------------------------------------------------------
 #
-# Let `y[t, k] = frame[t] @ kernel[:, k]` for one row, where a frame is the part of the row under filter k at position t.
+# Let `y[t, k] = frame[t] @ kernel[:, k]` for one row, where a frame is the part of the row under
+# filter k at position t.
 #
-# - Adding the bias and applying relu are monotonic, so they commute with the maximum: `max_t relu(y[t, k] + b[k])` equals
-#   `relu(max_t y[t, k] + b[k])`. They are thus applied to one number for each filter instead of 121.
-# - Dropout sets outputs of relu to 0, and relu is never negative. Dropout at rate p is therefore the same as excluding frames
-#   from the maximum: `relu(max over kept t of y[t, k] + b[k]) / (1 - p)`.
-# - The gradient of a maximum is nonzero only at the frames that attain it. Let `g = dL/dout` where relu is active and 0
-#   elsewhere, and let n be the number of frames that attain the maximum. Then `dL/dy[t, k] = g[k] / n[k]` at these frames and
-#   0 elsewhere. The gradient of the kernel is `sum over rows of g[k] / n[k] * (sum of these frames)`. That sum and n are
-#   computed in the forward pass, by one product of `[frame, 1]` with the indicator of these frames. The gradient of the rows
-#   is `dL/dy @ kernel^T`, summed where frames overlap.
+# - Adding the bias and applying relu are monotonic, so they commute with the maximum: `max_t
+#   relu(y[t, k] + b[k])` equals `relu(max_t y[t, k] + b[k])`. They are thus applied to one number
+#   for each filter instead of 121.
+# - Dropout sets outputs of relu to 0, and relu is never negative. Dropout at rate p is therefore
+#   the same as excluding frames from the maximum: `relu(max over kept t of y[t, k] + b[k]) / (1 -
+#   p)`.
+# - The gradient of a maximum is nonzero only at the frames that attain it. Let `g = dL/dout` where
+#   relu is active and 0 elsewhere, and let n be the number of frames that attain the maximum. Then
+#   `dL/dy[t, k] = g[k] / n[k]` at these frames and 0 elsewhere. The gradient of the kernel is `sum
+#   over rows of g[k] / n[k] * (sum of these frames)`. That sum and n are computed in the forward
+#   pass, by one product of `[frame, 1]` with the indicator of these frames. The gradient of the
+#   rows is `dL/dy @ kernel^T`, summed where frames overlap.
 # - For 200 rows, y takes 48 MB. Ten rows at a time, it fits into the processor's cache.
 #
-# In a `tf.function`, gradients that are not requested are not computed, because TensorFlow prunes operations without effect.
+# In a `tf.function`, gradients that are not requested are not computed, because TensorFlow prunes
+# operations without effect.
 
 _BLOCK_ROWS = 10  # number of rows in a block, whose products take 2.4 MB with 500 filters
 
@@ -260,7 +315,8 @@ def convolution_maximum(
     rate: float = 0.0,
     seed: tf.Tensor | None = None,
 ) -> tf.Tensor:
-    """Computes `GlobalMaxPooling1D()(Dropout(rate)(Conv1D(filters, width, stride, activation="relu")(rows)))`.
+    """Computes `GlobalMaxPooling1D()(Dropout(rate)(Conv1D(filters, width, stride,
+    activation="relu")(rows)))`.
 
     Args:
         rows: float32 of shape `(rows, samples)`, with a single channel and a static number of rows.
@@ -268,7 +324,8 @@ def convolution_maximum(
         bias: float32 of shape `(filters,)`.
         stride: Stride of the convolution in samples.
         rate: Dropout rate, rounded to a multiple of 1/65,536. 0 means no dropout.
-        seed: Seed for the dropout, an integer tensor of shape `(2,)`. It is required if the rate is above 0.
+        seed: Seed for the dropout, an integer tensor of shape `(2,)`. It is required if the rate is
+            above 0.
 
     Returns:
         float32 of shape `(rows, filters)`.
@@ -283,7 +340,8 @@ def convolution_maximum(
 
 
 class ConvolutionMaximum(keras.layers.Layer):
-    """Conv1D with relu, optionally Dropout, and GlobalMaxPooling1D as one layer, which holds the weights of the convolution.
+    """Conv1D with relu, optionally Dropout, and GlobalMaxPooling1D as one layer, which holds the
+    weights of the convolution.
 
     Args:
         convolution: The built Conv1D.
@@ -294,14 +352,17 @@ class ConvolutionMaximum(keras.layers.Layer):
         self, convolution: keras.layers.Conv1D, dropout: keras.layers.Dropout | None = None
     ):
         super().__init__()
-        self.convolution, self.dropout = convolution, dropout
+        self.convolution = convolution
+        self.dropout = dropout
 
     def compute_output_shape(self, input_shape: tuple[int | None, ...]) -> tuple[int | None, int]:
         """Returns `(rows, filters)`."""
         return input_shape[0], self.convolution.filters
 
     def call(self, rows: tf.Tensor, training: bool = False) -> tf.Tensor:
-        """Applies `convolution_maximum` to rows of shape `(rows, samples, 1)`, whose number is static."""
+        """Applies `convolution_maximum` to rows of shape `(rows, samples, 1)`, whose number is
+        static.
+        """
         kernel, bias = (
             tf.convert_to_tensor(weight)
             for weight in (self.convolution.kernel, self.convolution.bias)
@@ -320,8 +381,9 @@ def with_fast_convolution(discriminator: keras.Sequential) -> keras.Sequential:
     """Returns a network of the same layers and weights, whose first layers are computed as one.
 
     Args:
-        discriminator: A network that begins with a Conv1D of one channel with relu, optionally Dropout, and GlobalMaxPooling1D. If
-            the convolution's width is not a multiple of its stride, it is returned as it is.
+        discriminator: A network that begins with a Conv1D of one channel with relu, optionally
+            Dropout, and GlobalMaxPooling1D. If the convolution's width is not a multiple of its
+            stride, it is returned as it is.
     """
     convolution, *others = discriminator.layers
     if convolution.kernel_size[0] % convolution.strides[0]:
@@ -342,7 +404,8 @@ def _block(
     rate: float,
     seed: tf.Tensor | None,
 ) -> tf.Tensor:
-    (width, filters), (num_rows, samples) = kernel.shape, rows.shape
+    width, filters = kernel.shape
+    num_rows, samples = rows.shape
     num_frames = (samples - width) // stride + 1
     num_parts = width // stride  # number of parts of a frame, each `stride` samples long
     num_row_parts = num_frames - 1 + num_parts  # number of parts of a row, of the same length
@@ -377,9 +440,8 @@ def _block(
         outputs = tf.nn.relu(highest + bias)
         won = tf.equal(products, highest[:, None])
         frames_and_one = tf.concat([frames, tf.ones((num_rows, num_frames, 1))], axis=2)
-        of_winners = tf.matmul(
-            frames_and_one, tf.cast(won, tf.float32), transpose_a=True
-        )  # (rows, width + 1, filters)
+        # (rows, width + 1, filters)
+        of_winners = tf.matmul(frames_and_one, tf.cast(won, tf.float32), transpose_a=True)
 
         def backward(upstream: tf.Tensor) -> tuple:
             fired = tf.where(outputs > 0, upstream, 0.0)
@@ -399,7 +461,9 @@ def _block(
 
 
 def _kept(shape: tf.TensorShape, rate: float, seed: tf.Tensor) -> tf.Tensor:
-    """Draws a mask that is True with probability 1 - `rate`. Random bits are expensive, so 32 of them give two elements."""
+    """Draws a mask that is True with probability 1 - `rate`. Random bits are expensive, so 32 of
+    them give two elements.
+    """
     number = shape.num_elements()
     words = tf.random.stateless_uniform(
         ((number + 1) // 2,), seed, minval=None, maxval=None, dtype=tf.uint32

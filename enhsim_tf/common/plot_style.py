@@ -1,7 +1,7 @@
 """The common style of all figures: heading, panels, colours, and labels beside the curves.
 
-The colours remain distinguishable in greyscale and for colour-blind readers because they differ in lightness. Curves that share
-a panel also differ in line style, width or label.
+The colours remain distinguishable in greyscale and for colour-blind readers because they differ in
+lightness. Curves that share a panel also differ in line style, width or label.
 """
 
 import textwrap
@@ -14,21 +14,25 @@ import numpy as np
 from matplotlib.axes import Axes
 
 STYLE = ("default", Path(__file__).with_name("style.mplstyle"))  # for `matplotlib.style.context`
-REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
-RESIDUALS, RIDGE, LEARNT = (
-    "#009e73",
-    "#56b4e9",
-    "#cc79a7",
-)  # residual windows, ridge regression, other learnt noise
-QUIET, LINE = "#595959", "#8c8c8c"  # secondary text; outlines
-IN_PRINT = {
-    COARSE: QUIET,
-    GENERATED: "#b85000",
-    AVERAGE: "#946300",
-}  # darker colours for text that names a curve
+REAL = "#1a1a1a"
+COARSE = "#8c8c8c"
+ENHANCED = "#0072b2"
+GENERATED = "#d55e00"
+AVERAGE = "#e69f00"
+# residual windows, ridge regression, other learnt noise
+RESIDUALS = "#009e73"
+RIDGE = "#56b4e9"
+LEARNT = "#cc79a7"
+# secondary text; outlines
+QUIET = "#595959"
+LINE = "#8c8c8c"
+# darker colours for text that names a curve
+IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}
 DASHED = (0, (4, 2))  # line style of the second curve of a panel
 GREY_TINT = "#f3f3f3"
-SINGLE, DOUBLE = 3.5, 7.2  # widths of one and two journal columns, in inches
+# widths of one and two journal columns, in inches
+SINGLE = 3.5
+DOUBLE = 7.2
 FOOT = 0.26  # free space for the caption line at the bottom of each figure, in inches
 EDGE = 0.10  # distance from the edges of the figure to its text, in inches
 
@@ -88,7 +92,8 @@ def panels(
         Array of axes of shape `(rows, columns)`.
     """
     width, height = figure.get_size_inches()
-    left, bottom = 0.66, FOOT + 0.38
+    left = 0.66
+    bottom = FOOT + 0.38
     grid = {
         "left": left / width,
         "right": 1 - right / width,
@@ -103,8 +108,10 @@ def panels(
 
 def name_axes(axes: np.ndarray, data: Mapping[str, Any]) -> None:
     """Labels the time axis and the value axis of a grid once, with their units."""
-    figure, (width, height) = axes[0, 0].figure, axes[0, 0].figure.get_size_inches()
-    last, first = axes[-1, -1].get_position(), axes[0, 0].get_position()
+    figure = axes[0, 0].figure
+    width, height = axes[0, 0].figure.get_size_inches()
+    last = axes[-1, -1].get_position()
+    first = axes[0, 0].get_position()
     figure.text(
         (first.x0 + last.x1) / 2, (FOOT + 0.04) / height, f"time ({data['time_unit']})", ha="center"
     )
@@ -119,7 +126,9 @@ def name_axes(axes: np.ndarray, data: Mapping[str, Any]) -> None:
 
 
 def beside(axes: Axes, height: float, text: str, color: str) -> None:
-    """Puts a label to the right of the axes, at a height from 0 to 1 of them, in the colour of its curve or darker."""
+    """Puts a label to the right of the axes, at a height from 0 to 1 of them, in the colour of its
+    curve or darker.
+    """
     style = {
         "color": IN_PRINT.get(color, color),
         "va": "center",
@@ -130,7 +139,9 @@ def beside(axes: Axes, height: float, text: str, color: str) -> None:
 
 
 def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
-    """Labels the right ends of curves, given for each label as values and colour, and moves labels apart that would overlap."""
+    """Labels the right ends of curves, given for each label as values and colour, and moves labels
+    apart that would overlap.
+    """
     low, high = axes.get_ylim()
     inches = axes.get_position().height * axes.figure.get_size_inches()[1]
     ends = sorted(
@@ -147,8 +158,11 @@ def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
 
 
 def title_words(axes: Axes, words: Sequence[tuple[str, str]]) -> None:
-    """Writes a title of pairs of word and colour: each word has the colour of the curve that it names."""
-    width, place = axes.get_position().width * axes.figure.get_size_inches()[0], 0.0
+    """Writes a title of pairs of word and colour: each word has the colour of the curve that it
+    names.
+    """
+    width = axes.get_position().width * axes.figure.get_size_inches()[0]
+    place = 0.0
     for word, color in words:
         style = {"color": IN_PRINT.get(color, color), "weight": "bold", "annotation_clip": False}
         axes.annotate(word, (place, 1), (0, 4), "axes fraction", "offset points", **style)

@@ -1,9 +1,15 @@
-"""What readers of a user's files share: the exceptions of damaged files, how they become one line, and the most columns of a table."""
+"""What readers of a user's files share: the exceptions of damaged files, how they become one line,
+and the most columns of a table.
+"""
 
+import contextlib
 import struct
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Iterator
+
+from enhsim_tf.common.errors import InputError
 
 MAX_COLUMNS = 10_000  # of a table or an array; each column becomes a channel
 _DAMAGED = (
@@ -25,7 +31,26 @@ READ_ERRORS = (
     RuntimeError,
     *_DAMAGED,
 )
-"""Exceptions raised for damaged headers and archives; RuntimeError includes RecursionError and NotImplementedError."""
+"""Exceptions raised for damaged headers and archives; RuntimeError includes RecursionError and
+NotImplementedError.
+"""
+
+
+@contextlib.contextmanager
+def reading(name: str, *others: type[Exception]) -> Iterator[None]:
+    """Turns what a library raises for a damaged file, these exceptions or `others`, into an
+    `InputError`. Only calls of libraries stand in its block, so that no defect of ours is said to
+    be one of the file.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except (*READ_ERRORS, *others) as error:
+        raise InputError(
+            f"Expected a table. Received: {name}, which cannot be read ({short_reason(error)}). "
+            "Correct it or save it again."
+        ) from None
 
 
 def short_reason(error: Exception) -> str:

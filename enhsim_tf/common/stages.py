@@ -1,9 +1,11 @@
-"""Cached stages: each result is stored under a hash of what it depends on and reused by the next run.
+"""Cached stages: each result is stored under a hash of what it depends on and reused by the next
+run.
 
-A stage is a function that fills a folder, which is moved into place when it is complete. Its name contains a hash of the stage's settings
-and version, of the stages before it, and of the versions of packages. A person raises the version when changed code changes the result.
-An interrupted run leaves only complete stages, after which the next one continues. `stage.json` holds the checksums of the files: a stage
-that was damaged since is reported and run again.
+A stage is a function that fills a folder, which is moved into place when it is complete. Its name
+contains a hash of the stage's settings and version, of the stages before it, and of the versions of
+packages. A person raises the version when changed code changes the result. An interrupted run
+leaves only complete stages, after which the next one continues. `stage.json` holds the checksums of
+the files: a stage that was damaged since is reported and run again.
 """
 
 import hashlib
@@ -34,7 +36,9 @@ VERSIONS = {
 
 
 def default_cache() -> Path:
-    """The default cache: `ENHSIM_TF_CACHE`, or `.cache` in the folder of a source checkout, or the user's cache folder."""
+    """The default cache: `ENHSIM_TF_CACHE`, or `.cache` in the folder of a source checkout, or the
+    user's cache folder.
+    """
     if "ENHSIM_TF_CACHE" in os.environ:
         return Path(os.environ["ENHSIM_TF_CACHE"])
     checkout = Path(__file__).parents[2]
@@ -62,7 +66,10 @@ class Stages:
         tell: Callable[[str], None] = print,
         speaks: bool = False,
     ):
-        self.cache, self.fresh, self.tell, self.speaks = make_folder(cache), fresh, tell, speaks
+        self.cache = make_folder(cache)
+        self.fresh = fresh
+        self.tell = tell
+        self.speaks = speaks
         remove_leftovers(self.cache)
         self.seconds: dict[str, float] = {}
         self.cached: dict[str, bool] = {}
@@ -84,7 +91,8 @@ class Stages:
             make: Fills the folder it is given.
             settings: What the result depends on, anything with a faithful `repr`.
             after: Names of the stages whose results `make` reads.
-            version: Version of the code; a person raises it when a change of the code changes the result.
+            version: Version of the code; a person raises it when a change of the code changes the
+                result.
 
         Returns:
             The folder with the stage's results.
@@ -107,15 +115,18 @@ class Stages:
             done = self._run(name, make, folder)
         self.seconds[name] = done["seconds"]
         self.tell(
-            f"{name:12} {self.seconds[name]:7.1f} s{'  (from the cache)' if self.cached[name] else ''}"
+            f"{name:12} {self.seconds[name]:7.1f} "
+            f"s{'  (from the cache)' if self.cached[name] else ''}"
         )
         return folder
 
     def _run(self, name: str, make: Callable[[Path], None], folder: Path) -> dict[str, Any]:
         """Fills the folder of a stage and returns what its `stage.json` holds."""
         self.tell(f"{name:12} ...")
-        began, outer = time.perf_counter(), self.progress
-        # if two runs make the same stage, the first result is kept, because the other run may read it
+        began = time.perf_counter()
+        outer = self.progress
+        # if two runs make the same stage, the first result is kept, because the other run may read
+        # it
         with replace_folder(
             folder, keep=lambda path: not self.fresh and _read(path) is not None
         ) as temporary:
@@ -134,7 +145,7 @@ def _read(folder: Path) -> dict[str, Any] | None:
     try:
         done = json.loads((folder / "stage.json").read_text(encoding="utf-8"))
         return done if done["sha256"] == _checksums(folder) and done["seconds"] >= 0 else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
@@ -155,6 +166,8 @@ def save_arrays(folder: Path, arrays: Mapping[str, Any], name: str = "arrays") -
 
 
 def load_arrays(folder: Path, name: str = "arrays") -> dict[str, np.ndarray]:
-    """The arrays and numbers that `save_arrays` stored; numbers are returned as arrays of shape `()`."""
+    """The arrays and numbers that `save_arrays` stored; numbers are returned as arrays of shape
+    `()`.
+    """
     with np.load(folder / f"{name}.npz", allow_pickle=False) as archive:
         return dict(archive)

@@ -1,4 +1,6 @@
-"""Features of windows, and classifiers that tell generated windows from real ones by them (evaluates sections 2.2 and 2.3 of the paper)."""
+"""Features of windows, and classifiers that tell generated windows from real ones by them
+(evaluates sections 2.2 and 2.3 of the paper).
+"""
 
 from typing import Any
 
@@ -10,11 +12,13 @@ _FOLDS = 5  # of consecutive windows, so that few neighbours in time are separat
 
 
 def window_features(windows: np.ndarray) -> np.ndarray:
-    """Computes fourteen features of windows of shape `(windows, samples)`. Values far below 1e-6 have to be given in a larger unit.
+    """Computes fourteen features of windows of shape `(windows, samples)`. Values far below 1e-6
+    have to be given in a larger unit.
 
-    They are the mean, the logarithm of the standard deviation, the excess kurtosis, the maximum, the logarithm of the
-    standard deviation of the first differences, the autocorrelation at lag 1, and the logarithm of the power in eight
-    frequency bands whose edges are spaced evenly on a logarithmic scale. Very short windows have fewer bands.
+    They are the mean, the logarithm of the standard deviation, the excess kurtosis, the maximum,
+    the logarithm of the standard deviation of the first differences, the autocorrelation at lag 1,
+    and the logarithm of the power in eight frequency bands whose edges are spaced evenly on a
+    logarithmic scale. Very short windows have fewer bands.
     """
     values = np.asarray(windows, np.float64)
     tiny = 1e-12  # keeps logarithms and quotients of constant windows finite
@@ -45,15 +49,18 @@ def window_features(windows: np.ndarray) -> np.ndarray:
 def boosted_trees(
     generated_features: np.ndarray, real_features: np.ndarray, seed: int = 0
 ) -> float:
-    """Classifier two-sample test (Lopez-Paz and Oquab 2017) with gradient-boosted trees and fixed hyperparameters.
+    """Classifier two-sample test (Lopez-Paz and Oquab 2017) with gradient-boosted trees and fixed
+    hyperparameters.
 
     Args:
         generated_features: Features of generated windows, shape `(windows, features)`.
-        real_features: Features of real windows, in the order of time. If the numbers of windows differ, additional windows are ignored.
+        real_features: Features of real windows, in the order of time. If the numbers of windows
+            differ, additional windows are ignored.
         seed: Seed for the trees.
 
     Returns:
-        The cross-validated area under the ROC curve (AUC): 0.5 if the classifier cannot distinguish the windows, 1 if it always can.
+        The cross-validated area under the ROC curve (AUC): 0.5 if the classifier cannot distinguish
+        the windows, 1 if it always can.
 
     Raises:
         InputError: If there are fewer than two windows of each kind for each fold.
@@ -71,7 +78,9 @@ def boosted_trees(
 def held_out_auc(
     classifier: Any, method: str, generated_features: np.ndarray, real_features: np.ndarray
 ) -> float:
-    """The same as `boosted_trees` for a classifier of scikit-learn and the method that gives its scores."""
+    """The same as `boosted_trees` for a classifier of scikit-learn and the method that gives its
+    scores.
+    """
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import cross_val_predict
     from threadpoolctl import threadpool_limits
@@ -87,9 +96,8 @@ def held_out_auc(
     splits = [
         (np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)) for fold in range(_FOLDS)
     ]
-    with threadpool_limits(
-        1
-    ):  # on a busy machine, several threads that wait for each other are ten times slower
+    # on a busy machine, several threads that wait for each other are ten times slower
+    with threadpool_limits(1):
         scores = cross_val_predict(classifier, features, labels, cv=splits, method=method)
     return float(roc_auc_score(labels, scores[:, 1] if scores.ndim == 2 else scores))
 

@@ -1,7 +1,9 @@
-"""Labelled windows: the plan of a set of them, and writing them to Parquet files, all to one, or each shard to a file of its own.
+"""Labelled windows: the plan of a set of them, and writing them to Parquet files, all to one, or
+each shard to a file of its own.
 
-The windows of a shard depend only on the plan and the number of the shard, which has a random seed of its own. The bytes of a shard are
-therefore the same in every worker and in every order of generation. Two plans with the same `plan_key` describe the same shards.
+The windows of a shard depend only on the plan and the number of the shard, which has a random seed
+of its own. The bytes of a shard are therefore the same in every worker and in every order of
+generation. Two plans with the same `plan_key` describe the same shards.
 """
 
 import contextlib
@@ -19,10 +21,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse.degraded import Degraded
 from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError, counted
-from enhsim_tf.datasets.label_columns import NOMINAL, window_table
+from enhsim_tf.datasets.label_columns import window_table
 from enhsim_tf.datasets.places import ScenarioRange
 from enhsim_tf.simulator.model_folder import MANIFEST
 from enhsim_tf.simulator.simulator import EnhancedSimulator
@@ -38,7 +40,9 @@ _KEY = b"settings"  # of the metadata of a file
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """The plan of a set of labelled windows: its scenarios, and what it uses of its model, a saved simulator."""
+    """The plan of a set of labelled windows: its scenarios, and what it uses of its model, a saved
+    simulator.
+    """
 
     scenarios: tuple[ScenarioRange, ...]  # with equal shares of the windows that are not nominal
     nominal_share: float
@@ -58,7 +62,9 @@ class Plan:
             )
         if self.nominal_share < 1 and round(self.num_windows * self.shares[-1], 6) < 1:
             raise InputError(
-                f"Expected at least one window for each of {counted(len(self.scenarios), 'scenario')}. Received: {counted(self.num_windows, 'window')}, of which a "
+                "Expected at least one window for each of "
+                f"{counted(len(self.scenarios), 'scenario')}. Received: "
+                f"{counted(self.num_windows, 'window')}, of which a "
                 f"share of {self.nominal_share:g} is nominal. Ask for more windows."
             )
 
@@ -80,7 +86,9 @@ class Plan:
         return min(self.shard, self.num_windows - shard * self.shard)
 
     def settings(self) -> dict[str, Any]:
-        """Returns all settings on which the content depends, in plain JSON types. Paths are not among them."""
+        """Returns all settings on which the content depends, in plain JSON types. Paths are not
+        among them.
+        """
         settings = {
             "windows": self.num_windows,
             "shard": self.shard,
@@ -97,7 +105,9 @@ class Plan:
 
 
 def plan_key(settings: Mapping[str, Any]) -> str:
-    """Returns the checksum of all settings except the number of windows. Shards with equal key, number and size have identical bytes."""
+    """Returns the checksum of all settings except the number of windows. Shards with equal key,
+    number and size have identical bytes.
+    """
     others = {name: value for name, value in settings.items() if name != "windows"}
     return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
@@ -110,13 +120,13 @@ def make_plan(
     num_windows: int,
     seed: int,
 ) -> Plan:
-    """Makes the plan of labelled windows of a simulator that is saved in a folder. Without scenarios, all of them are nominal."""
+    """Makes the plan of labelled windows of a simulator that is saved in a folder. Without
+    scenarios, all of them are nominal.
+    """
     folder = Path(folder).absolute()
-    rng = np.random.default_rng(0)
-    simulator.alignment.draw(
-        np.zeros(len(scenarios), int), [each.draw(rng) for each in scenarios], rng
-    )  # refuses what it cannot apply
-    window, channels = simulator.window, simulator.channels
+    simulator.alignment.check(scenarios)
+    window = simulator.window
+    channels = simulator.channels
     return Plan(
         tuple(scenarios),
         nominal_share if scenarios else 1.0,
@@ -137,14 +147,18 @@ def shard_file(shard: int) -> str:
 
 
 def draw_scenarios(plan: Plan, shard: int) -> list[Degraded | None]:
-    """Draws the scenario of each window of a shard, None if it is nominal. Each has its share of the windows, rounded at random."""
+    """Draws the scenario of each window of a shard, None if it is nominal. Each has its share of
+    the windows, rounded at random.
+    """
     rng = np.random.default_rng([_STREAM, plan.seed, shard])
     numbers = systematic(plan.shares, plan.num_windows_in(shard), rng)
     return [plan.scenarios[number - 1].draw(rng) if number else None for number in numbers.tolist()]
 
 
 def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator) -> np.ndarray:
-    """Assigns rows to categories in random order by systematic sampling: each category gets its share, rounded up or down."""
+    """Assigns rows to categories in random order by systematic sampling: each category gets its
+    share, rounded up or down.
+    """
     edges = np.cumsum(shares) / np.sum(shares)
     points = (rng.random() + np.arange(num_rows)) / num_rows
     return rng.permutation(
@@ -158,9 +172,11 @@ def write_windows(
     simulator: EnhancedSimulator,
     shards: Iterable[int] | None = None,
 ) -> None:
-    """Writes the windows of some shards to one Parquet file, chunk by chunk. The file appears only when it is complete.
+    """Writes the windows of some shards to one Parquet file, chunk by chunk. The file appears only
+    when it is complete.
 
-    A window that its scenario has not changed, such as one in which the mechanism would have stood still anyway, is labelled nominal.
+    A window that its scenario has not changed, such as one in which the mechanism would have stood
+    still anyway, is labelled nominal.
 
     Args:
         path: Path of the file.
@@ -175,8 +191,9 @@ def write_windows(
         "channel": ", ".join(plan.channels),
     }
     none = np.zeros((0, plan.window, len(plan.channels)), np.float32)
-    schema = window_table(none, none > 0, plan.channels, [], []).schema.with_metadata(about)
-    # bytes of equal significance are stored together: signs and exponents compress well, noisy mantissas do not
+    schema = window_table(none, none > 0, plan.channels, []).schema.with_metadata(about)
+    # bytes of equal significance are stored together: signs and exponents compress well, noisy
+    # mantissas do not
     encoding = {
         f"{name}.list.element": "BYTE_STREAM_SPLIT"
         for name in schema.names
@@ -190,23 +207,19 @@ def write_windows(
     }
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
         for shard in range(plan.num_shards) if shards is None else shards:
-            (seed,) = (
-                np.random.SeedSequence([_STREAM, plan.seed, shard, 1])
-                .generate_state(1, np.uint64)
-                .tolist()
-            )
-            scenarios, first = draw_scenarios(plan, shard), 0
+            sequence = np.random.SeedSequence([_STREAM, plan.seed, shard, 1])
+            seed = int(sequence.generate_state(1, np.uint64)[0])
+            scenarios = draw_scenarios(plan, shard)
             for windows, masks in simulator.generate_labelled_chunks(scenarios, seed):
-                some, first = scenarios[first : first + len(windows)], first + len(windows)
-                names, severities = zip(
-                    *((each.mode, each.severity) if each else (NOMINAL, 0.0) for each in some),
-                    strict=True,
-                )
-                writer.write_table(window_table(windows, masks, plan.channels, names, severities))
+                drawn = scenarios[: len(windows)]
+                scenarios = scenarios[len(windows) :]
+                writer.write_table(window_table(windows, masks, plan.channels, drawn))
 
 
 def finished_shards(folder: Path, plan: Plan) -> Iterator[tuple[int, str]]:
-    """Yields number and checksum of the shards whose files are there and have the key and the number of windows of the plan."""
+    """Yields number and checksum of the shards whose files are there and have the key and the
+    number of windows of the plan.
+    """
     key = plan_key(plan.settings()).encode()
     for shard in range(plan.num_shards):
         path = folder / shard_file(shard)
@@ -219,33 +232,41 @@ def finished_shards(folder: Path, plan: Plan) -> Iterator[tuple[int, str]]:
 
 
 class ShardMaker:
-    """Generates shards in one process. The model is loaded once; each call writes one file to the folder."""
+    """Generates shards in one process. The model is loaded once; each call writes one file to the
+    folder.
+    """
 
     def __init__(self, plan: Plan, folder: str | os.PathLike):
-        self.plan, self.folder = plan, Path(folder).absolute()
-        self.settings = (
-            plan.settings()
-        )  # computed on the main machine; workers on other machines must agree
+        self.plan = plan
+        self.folder = Path(folder).absolute()
+        # computed on the main machine; workers on other machines must agree
+        self.settings = plan.settings()
 
     @functools.cached_property
     def simulator(self) -> EnhancedSimulator:
-        """The loaded model of the plan, if it is still the same, and the libraries of this machine too."""
+        """The loaded model of the plan, if it is still the same, and the libraries of this machine
+        too.
+        """
         if self.plan.settings() != self.settings:
             versions = ", ".join(
                 f"{name} {version}" for name, version in self.settings["versions"].items()
             )
             raise InputError(
-                f"Expected every machine to have {versions}. Received: other versions on {os.uname().nodename}. Install these."
+                f"Expected every machine to have {versions}. Received: other versions on "
+                f"{os.uname().nodename}. Install these."
             )
         simulator = EnhancedSimulator.load(self.plan.folder)
         if sha256(self.plan.folder / MANIFEST) != self.plan.sha256:
             raise InputError(
-                f"Expected the same model as at the start of the data set. Received: another model in {self.plan.folder}."
+                "Expected the same model as at the start of the data set. Received: another model "
+                f"in {self.plan.folder}."
             )
         return simulator
 
     def __call__(self, shard: int) -> tuple[int, str]:
-        """Generates a shard, writes its file atomically, and returns its number and the checksum of the file."""
+        """Generates a shard, writes its file atomically, and returns its number and the checksum of
+        the file.
+        """
         path = self.folder / shard_file(shard)
         write_windows(path, self.plan, self.simulator, [shard])
         return shard, sha256(path)

@@ -1,4 +1,4 @@
-"""Scenarios, lengths, times and places of events as they are written on the command line, and the options of `inject`.
+"""Scenarios, lengths, times and places of events as they are written on the command line.
 
 Nothing slow is imported, since they are checked before anything else.
 """
@@ -11,25 +11,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
+from enhsim_tf.coarse.degraded import MODES, Degraded
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.anomalies import INJECTIONS, check_kind
+from enhsim_tf.datasets.anomalies import check_kind
 
 if TYPE_CHECKING:
     import pandas as pd
 
-WITHOUT_SEVERITY = ("another_time", "delay", "lost_coupling")
-JOINT_KINDS = (*WITHOUT_SEVERITY, "common_shift")
-_MOST = 10_000  # anomalies in a channel
 _PLACE = re.compile(r"(?P<kind>\w+)(?::(?P<severity>[^@]+))?@(?P<begin>.+)/(?P<length>[^/]+)")
 _SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
 _LENGTH = re.compile(
     r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?"
 )  # decimals need a unit, because a number of samples is a whole number
 _MOST_SAMPLES = 20_000_000  # of a series, which is held in memory
-_degraded = functools.lru_cache(128)(
-    Degraded
-)  # thousands of windows of one scenario without a range share one object
+# thousands of windows of one scenario without a range share one object
+_degraded = functools.lru_cache(128)(Degraded)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,11 +35,13 @@ class ScenarioRange:
     Args:
         mode: One of `degraded.MODES`.
         severity: Least and greatest severity, from 0 to 1.
-        onset: Least and greatest onset, as a share of the window or series: at least 0 and less than 1.
+        onset: Least and greatest onset, as a share of the window or series: at least 0 and less
+            than 1.
         channel: The only channel that is degraded; None for all.
 
     Raises:
-        InputError: If the mode is unknown, a number is out of range, or a range has the greater number first.
+        InputError: If the mode is unknown, a number is out of range, or a range has the greater
+            number first.
     """
 
     mode: str
@@ -56,7 +54,8 @@ class ScenarioRange:
             Degraded(self.mode, severity, onset)  # checks all three
         if self.severity[0] > self.severity[1] or self.onset[0] > self.onset[1]:
             raise InputError(
-                f"Expected ranges with the lower number first. Received: {self.severity} and {self.onset}."
+                f"Expected ranges with the lower number first. Received: {self.severity} and "
+                f"{self.onset}."
             )
 
     def __str__(self) -> str:
@@ -71,7 +70,9 @@ class ScenarioRange:
 
 
 def parse_scenario(text: str) -> ScenarioRange:
-    """Parses `[CHANNEL=]MODE:SEVERITY[:ONSET]`, in which both are a number or a range `low-high`, such as `volts=stuck:0.2-0.8:0.5`."""
+    """Parses `[CHANNEL=]MODE:SEVERITY[:ONSET]`, in which both are a number or a range `low-high`,
+    such as `volts=stuck:0.2-0.8:0.5`.
+    """
     channel, is_named, rest = text.rpartition("=")
     mode, *numbers = rest.split(":")
     try:
@@ -81,15 +82,15 @@ def parse_scenario(text: str) -> ScenarioRange:
         return ScenarioRange(mode, severity, onset, channel if is_named else None)
     except ValueError:
         raise InputError(
-            "Expected MODE:SEVERITY or MODE:SEVERITY:ONSET with numbers from 0 to 1 (the onset below 1) or ranges low-high, such as stuck:0.5 "
+            "Expected MODE:SEVERITY or MODE:SEVERITY:ONSET with numbers from 0 to 1 (the onset "
+            "below 1) or ranges low-high, such as stuck:0.5 "
             f"or stuck:0.2-0.8:0.1-0.9, mode one of: {', '.join(MODES)}. Received: {text!r}."
         ) from None
 
 
 def _limits(text: str) -> tuple[float, float]:
-    numbers = [
-        float(number) for number in re.split(r"(?<=[\d.])-", text, maxsplit=1)
-    ]  # the hyphen of 1e-3 follows a letter
+    # the hyphen of 1e-3 follows a letter
+    numbers = [float(number) for number in re.split(r"(?<=[\d.])-", text, maxsplit=1)]
     return numbers[0], numbers[-1]
 
 
@@ -99,29 +100,35 @@ def parse_length(text: str) -> tuple[float, str]:
     Returns:
         The number and its unit, for example `(86400.0, "s")` or `(5000.0, "samples")`.
     """
-    found = _LENGTH.fullmatch(text.casefold())
-    length = float(found["number"]) if found else 0.0
+    match = _LENGTH.fullmatch(text.casefold())
+    length = float(match["number"]) if match else 0.0
     if not 0 < length < float("inf"):
         raise InputError(
-            f"Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: {text[:80]!r}."
+            "Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: "
+            f"{text[:80]!r}."
         )
-    return (length * _SECONDS[found["unit"]], "s") if found["unit"] else (length, "samples")
+    return (length * _SECONDS[match["unit"]], "s") if match["unit"] else (length, "samples")
 
 
 def parse_num_samples(text: str, interval_s: float) -> int:
-    """Converts a length in the form of `parse_length` to a number of samples, one every `interval_s` seconds."""
+    """Converts a length in the form of `parse_length` to a number of samples, one every
+    `interval_s` seconds.
+    """
     length, unit = parse_length(str(text))
     samples = length if unit == "samples" else length / interval_s
     if not 0.5 <= samples <= _MOST_SAMPLES:
         raise InputError(
-            f"Expected a length of 1 to {_MOST_SAMPLES:,} samples, one every {interval_s:g} s. Received: {str(text)[:80]!r}, which is "
+            f"Expected a length of 1 to {_MOST_SAMPLES:,} samples, one every {interval_s:g} s. "
+            f"Received: {str(text)[:80]!r}, which is "
             f"{samples:,.10g} samples. Write several series, each with its own --seed."
         )
     return max(1, round(samples))
 
 
 def parse_start(start: "str | pd.Timestamp") -> "pd.Timestamp":
-    """Converts a time such as `2024-01-01`, from 1700 to 2200, to UTC. A time without a time zone is taken as UTC."""
+    """Converts a time such as `2024-01-01`, from 1700 to 2200, to UTC. A time without a time zone
+    is taken as UTC.
+    """
     import pandas as pd
 
     try:
@@ -130,7 +137,8 @@ def parse_start(start: "str | pd.Timestamp") -> "pd.Timestamp":
         time = pd.NaT
     if pd.isna(time) or not 1700 <= time.year <= 2200:
         raise InputError(
-            f"Expected a start such as 2024-01-01 or 2024-01-01T12:00, from 1700 to 2200. Received: {str(start)[:80]!r}."
+            "Expected a start such as 2024-01-01 or 2024-01-01T12:00, from 1700 to 2200. "
+            f"Received: {str(start)[:80]!r}."
         )
     return time
 
@@ -145,14 +153,17 @@ class Place:
     length: str
 
     def samples(self, index: "pd.Index", interval_s: float) -> tuple[int, int]:
-        """Returns the first sample and the number of samples; the index of the series has times in UTC, or is that of one without times."""
+        """Returns the first sample and the number of samples; the index of the series has times in
+        UTC, or is that of one without times.
+        """
         length = parse_num_samples(self.length, interval_s)
         if self.begin.isdecimal():
             return int(self.begin[:12]), length
         time = parse_start(self.begin)
         if not hasattr(index, "tz"):
             raise InputError(
-                f"Expected a sample number as the place, since the series has no times. Received: {self.begin[:80]!r}."
+                "Expected a sample number as the place, since the series has no times. Received: "
+                f"{self.begin[:80]!r}."
             )
         first = int(index.searchsorted(time))
         if (
@@ -161,29 +172,35 @@ class Place:
             or (index[first] - time).total_seconds() > interval_s
         ):
             raise InputError(
-                f"Expected a time from {index[0].isoformat()} to {index[-1].isoformat()}, not in a gap. Received: {self.begin[:80]!r}. "
+                f"Expected a time from {index[0].isoformat()} to {index[-1].isoformat()}, not in a "
+                f"gap. Received: {self.begin[:80]!r}. "
                 "Choose another."
             )
         return first, length
 
 
 def parse_place(text: str, severity: float | None = None) -> Place:
-    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`, such as `ramp:4@5000/200` or `stuck:1@2024-01-05T12:00/2h`. The kind is not checked."""
-    found = _PLACE.fullmatch(text)
+    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`, such as `ramp:4@5000/200` or
+    `stuck:1@2024-01-05T12:00/2h`. The kind is not checked.
+    """
+    match = _PLACE.fullmatch(text)
     try:
-        if not found:
+        if not match:
             raise ValueError
-        severity = float(found["severity"]) if found["severity"] else severity
+        severity = float(match["severity"]) if match["severity"] else severity
     except ValueError:
         raise InputError(
-            f"Expected KIND[:SEVERITY]@BEGIN/LENGTH, such as stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h. Received: {text[:80]!r}."
+            "Expected KIND[:SEVERITY]@BEGIN/LENGTH, such as stuck:1@5000/200 or "
+            f"drift:0.5@2024-01-05T12:00/2h. Received: {text[:80]!r}."
         ) from None
-    parse_length(found["length"])
-    return Place(found["kind"], severity, found["begin"], found["length"])
+    parse_length(match["length"])
+    return Place(match["kind"], severity, match["begin"], match["length"])
 
 
 def length_limits(limits: Sequence[str], interval_s: float) -> tuple[int, int]:
-    """Converts the least and the greatest length of events to samples, one every `interval_s` seconds."""
+    """Converts the least and the greatest length of events to samples, one every `interval_s`
+    seconds.
+    """
     shortest, longest = (parse_num_samples(text, interval_s) for text in limits)
     if shortest > longest:
         raise InputError(
@@ -192,78 +209,12 @@ def length_limits(limits: Sequence[str], interval_s: float) -> tuple[int, int]:
     return shortest, longest
 
 
-def split_limits(name: str, text: str) -> tuple[str, str]:
-    """Splits `least:greatest`, the value of the option `--name`; one value stands for both."""
-    least, colon, greatest = text.partition(":")
-    if not least or (colon and not greatest) or ":" in greatest:
-        raise InputError(
-            f"Expected --{name} as one value, or as least:greatest. Received: --{name} {text}."
-        )
-    return least, greatest or least
-
-
 def draw_between(limits: tuple[float, float], rng: np.random.Generator) -> float:
-    """Draws a number uniformly between two limits; if they are equal, it is that number and nothing is drawn."""
+    """Draws a number uniformly between two limits; if they are equal, it is that number and nothing
+    is drawn.
+    """
     low, high = limits
     return low if low == high else float(rng.uniform(low, high))
-
-
-@dataclasses.dataclass(frozen=True)
-class InjectOptions:
-    """Settings of `inject`.
-
-    Args:
-        kinds: Kinds of the anomalies whose places are drawn, of `anomalies.INJECTIONS` or of `JOINT_KINDS`. They are used in turn.
-        severity: Least and greatest severity, in units of the standard deviation of the noise. Each anomaly draws its own; those of
-            `WITHOUT_SEVERITY` have none.
-        length: Least and greatest length: samples, or a time such as `10min`. Each anomaly draws its own.
-        number: Number of anomalies whose places are drawn. None: one of each kind.
-        at: Anomalies at given places, `KIND[:SEVERITY]@BEGIN/LENGTH`. BEGIN is a sample number or a time. The severity is drawn if it
-            is not given.
-        noise_sd: Standard deviation of the noise, in the unit of the channel. None: `anomalies.estimate_noise_sd`.
-        seed: Random seed. A channel on its own draws from a generator that depends on the seed and the name of the channel.
-
-    Raises:
-        InputError: If a kind is unknown, a number is out of range, or options contradict each other.
-    """
-
-    kinds: Sequence[str] = ()
-    severity: tuple[float, float] = (4.0, 4.0)
-    length: tuple[str, str] = ("100", "100")
-    number: int | None = None
-    at: Sequence[str] = ()
-    noise_sd: float | None = None
-    seed: int = 0
-
-    @property
-    def is_joint(self) -> bool:
-        """Whether the anomalies are those of several channels."""
-        return bool(set(self.kinds) & set(JOINT_KINDS))
-
-    def __post_init__(self):
-        low, high = self.severity
-        for kind in self.kinds:
-            check_kind(kind, low, (*INJECTIONS, *JOINT_KINDS))
-        if not (0 <= low <= high and (high < np.inf or low == high)):
-            raise InputError(
-                f"Expected severities from 0 on, the least first. Received: {low:g}:{high:g}."
-            )
-        if not self.kinds and not self.at:
-            raise InputError(
-                "Expected kinds of anomaly or places. Received: neither. Give --kinds, such as all, or --at."
-            )
-        if self.number is not None and (not 1 <= self.number <= _MOST or not self.kinds):
-            raise InputError(
-                f"Expected 1 to {_MOST:,} anomalies with drawn places, of given kinds. Received: number={self.number}."
-            )
-        if self.noise_sd is not None and not 0 < self.noise_sd < np.inf:
-            raise InputError(
-                f"Expected a standard deviation of the noise above 0. Received: noise_sd={self.noise_sd}."
-            )
-        for text in self.length:
-            parse_length(str(text))
-        for text in self.at:
-            checked_place(text)
 
 
 def checked_place(text: str) -> Place:

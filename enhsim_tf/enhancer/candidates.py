@@ -1,8 +1,10 @@
-"""The candidates for the enhancer, from the coarse simulator itself to the paper's network, and the choice among them (section 2.2).
+"""The candidates for the enhancer, from the coarse simulator itself to the paper's network, and the
+choice among them (section 2.2).
 
-Each is judged on blocks of time that it was not fitted to. The simplest one whose error is within one standard error, or within 1 %, of the
-best is used. What no linear map can learn is left to random rectified features (Rahimi and Recht 2007): a network whose hidden layer is
-drawn and whose output layer is a ridge regression. The paper's network is trained only if it is asked for.
+Each is judged on blocks of time that it was not fitted to. The simplest one whose error is within
+one standard error, or within 1 %, of the best is used. What no linear map can learn is left to
+random rectified features (Rahimi and Recht 2007): a network whose hidden layer is drawn and whose
+output layer is a ridge regression. The paper's network is trained only if it is asked for.
 """
 
 import dataclasses
@@ -12,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from enhsim_tf.coarse.pairing import covariance_and_power, most_similar
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
@@ -29,24 +32,33 @@ from enhsim_tf.paper.settings import Settings
 
 _NUM_FEATURES = 1_000  # random rectified features
 _NEGLIGIBLE = 0.02  # share of the best candidate's squared error: 1 % of its error
-NUM_FOLDS = 3  # folds of interleaved blocks, so that each fold covers the beginning, the middle and the end of the time
+# folds of interleaved blocks, so that each fold covers the beginning, the middle and the end of the
+# time
+NUM_FOLDS = 3
 _MOST_BLOCKS = 9
 _WINDOWS_IN_BLOCK = 3  # preferred minimum length of a block, in windows
 
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """The error of one candidate on held-out time, with standard errors from disjoint stretches of one window each."""
+    """The error of one candidate on held-out time, with standard errors from disjoint stretches of
+    one window each.
+    """
 
     name: str  # one of `CANDIDATES`
-    error: float  # root-mean-square error, divided by the standard deviation of the targets (NRMSE), over all channels
+    # root-mean-square error, divided by the standard deviation of the targets (NRMSE), over all
+    # channels
+    error: float
     standard_error: float
-    behind: float  # mean squared error minus that of the best candidate, divided by the targets' variance
+    # mean squared error minus that of the best candidate, divided by the targets' variance
+    behind: float
     behind_standard_error: float
 
     @property
     def is_within(self) -> bool:
-        """Whether the candidate is within one standard error of the best one, or behind by 1 % of its error at most."""
+        """Whether the candidate is within one standard error of the best one, or behind by 1 % of
+        its error at most.
+        """
         return self.behind <= max(
             self.behind_standard_error, _NEGLIGIBLE * (self.error**2 - self.behind)
         )
@@ -59,12 +71,10 @@ class Choice:
     enhancer: Enhancer  # fitted to all windows
     judged: tuple[Judged, ...]  # the held-out error of each candidate that was tried
     edges: np.ndarray  # of the blocks of time; the blocks of fold 0 were held out
-    without_fold: (
-        Enhancer  # the chosen candidate as it was judged, fitted without the held-out blocks
-    )
-    penalties: tuple[
-        float, ...
-    ]  # of ridge regression, one for each channel, chosen without the held-out blocks
+    # the chosen candidate as it was judged, fitted without the held-out blocks
+    without_fold: Enhancer
+    # of ridge regression, one for each channel, chosen without the held-out blocks
+    penalties: tuple[float, ...]
 
 
 def choose_enhancer(
@@ -95,40 +105,42 @@ def choose_enhancer(
     rows, held_out = split_fold(starts, window, edges, fold=0)
     if len(rows) < 2 or len(held_out) < 2:
         raise InputError(
-            f"Expected at least two training windows and two held-out windows. Received: {len(rows)} and {len(held_out)} of {len(starts)}. "
+            "Expected at least two training windows and two held-out windows. Received: "
+            f"{len(rows)} and {len(held_out)} of {len(starts)}. "
             "Give more windows, or longer telemetry."
         )
     stretches = np.unique(starts[held_out] // window, return_inverse=True)[1]
     variance = np.var(targets[held_out], axis=(0, 1), dtype=np.float64)
     variance = np.where(variance > 0, variance, 1.0)
-    learnt, fitted, squared = Training(inputs[rows], targets[rows], starts[rows]), {}, {}
+    learnt = Training(inputs[rows], targets[rows], starts[rows])
+    fitted = {}
+    squared = {}
     for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
         progress.step(f"enhancer {name}")
         fitted[name] = learnt.fit(name, seed, epochs)
-        errors = (
-            np.mean(
-                (fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2,
-                axis=1,
-                dtype=np.float64,
-            )
-            / variance
-        )
+        apart = (fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2
+        errors = np.mean(apart, axis=1, dtype=np.float64) / variance
         squared[name] = np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
-    judged, penalties = judge(squared), learnt.ridge.chosen
-    chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
+    judged = judge(squared)
+    penalties = learnt.ridge.chosen
+    chosen = wanted
+    if wanted == BEST:
+        chosen = next(candidate.name for candidate in judged if candidate.is_within)
     enhancer = Training(inputs, targets, starts, penalties).fit(chosen, seed, epochs)
     return Choice(enhancer, judged, edges, fitted[chosen], penalties)
 
 
 def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
-    """Compares candidates by their mean squared errors, in units of the targets' variance, on the same held-out stretches of time."""
+    """Compares candidates by their mean squared errors, in units of the targets' variance, on the
+    same held-out stretches of time.
+    """
     best = min(squared, key=lambda name: np.mean(squared[name]))
     judged = []
     for name, errors in squared.items():
-        error, apart = float(np.sqrt(np.mean(errors))), errors - squared[best]
-        spread = (
-            _standard_error(errors) / (2 * error) if error else 0.0
-        )  # the derivative of the root
+        error = float(np.sqrt(np.mean(errors)))
+        apart = errors - squared[best]
+        # the derivative of the root
+        spread = _standard_error(errors) / (2 * error) if error else 0.0
         judged.append(Judged(name, error, spread, float(np.mean(apart)), _standard_error(apart)))
     return tuple(judged)
 
@@ -138,13 +150,15 @@ def _standard_error(values: np.ndarray) -> float:
 
 
 class Training:
-    """Windows that candidates are fitted to; the ridge regression on them is fitted once, for both candidates with one.
+    """Windows that candidates are fitted to; the ridge regression on them is fitted once, for both
+    candidates with one.
 
     Args:
         inputs: Coarse windows, shape `(windows, samples, columns)`.
         targets: Telemetry windows, shape `(windows, samples, channels)`.
         starts: First sample of each window, shape `(windows,)`.
-        penalties: Penalty of each channel, as `Choice.penalties` of similar windows; None: chosen by blocks of time.
+        penalties: Penalty of each channel, as `Choice.penalties` of similar windows; None: chosen
+            by blocks of time.
     """
 
     def __init__(
@@ -154,15 +168,17 @@ class Training:
         starts: np.ndarray,
         penalties: Sequence[float] | None = None,
     ):
-        self.inputs, self.targets, self.starts, self.penalties = inputs, targets, starts, penalties
-        self.centre, self.middle = (
-            each.mean(axis=(0, 1), dtype=np.float64) for each in (inputs, targets)
-        )
-        self.scale, self.unit = (_deviations(each) for each in (inputs, targets))
+        self.inputs = inputs
+        self.targets = targets
+        self.starts = starts
+        self.penalties = penalties
+        self.centre = inputs.mean(axis=(0, 1), dtype=np.float64)
+        self.middle = targets.mean(axis=(0, 1), dtype=np.float64)
+        self.scale = _deviations(inputs)
+        self.unit = _deviations(targets)
         self.rows = ((inputs - self.centre) / self.scale).astype(np.float32)
-        self.outputs = (
-            ((targets - self.middle) / self.unit).astype(np.float32).reshape(len(targets), -1)
-        )
+        outputs = ((targets - self.middle) / self.unit).astype(np.float32)
+        self.outputs = outputs.reshape(len(targets), -1)
 
     @functools.cached_property
     def ridge(self) -> Ridge:
@@ -172,41 +188,47 @@ class Training:
         )
 
     def fit(self, name: str, seed: int = 0, epochs: int = 6) -> Enhancer:
-        """Fits one of `CANDIDATES` to all windows, as in `choose_enhancer`; raises InputError if there is none, or the training diverges."""
+        """Fits one of `CANDIDATES` to all windows, as in `choose_enhancer`; raises InputError if
+        there is none, or the training diverges.
+        """
         if name in (COARSE, LEVEL_AND_GAIN):
             return self._keeping_the_shape(name)
         if name not in CANDIDATES:
             raise InputError(
                 f"Expected an enhancer, one of: {', '.join(CANDIDATES)}. Received: {name!r}."
             )
-        window, flat = self.rows.shape[1], self.rows.reshape(len(self.rows), -1)
-        column_scale, output_unit = np.tile(self.scale, window), np.tile(self.unit, window)
-        linear, factors, layers = np.zeros(self.outputs.shape[1]), (), ()
+        window = self.rows.shape[1]
+        flat = self.rows.reshape(len(self.rows), -1)
+        column_scale = np.tile(self.scale, window)
+        output_unit = np.tile(self.unit, window)
+        linear = np.zeros(self.outputs.shape[1])
+        factors = ()
+        layers = ()
         if name == NETWORK:
             layers = _train(flat, self.outputs, seed, epochs)
         else:
-            ridge, maps = self.ridge, list(self.ridge.factors)
+            ridge = self.ridge
+            maps = list(self.ridge.factors)
             linear = ridge.target_mean - functools.reduce(np.matmul, maps, ridge.input_mean.ravel())
             maps[0] = maps[0] / column_scale[:, None]
             maps[-1] = maps[-1] * output_unit
-            factors = tuple(each.astype(np.float32) for each in maps)
+            factors = tuple(matrix.astype(np.float32) for matrix in maps)
         if name == RIDGE_AND_FEATURES:
             layers = _random_features(
                 flat, self.outputs - ridge.predict(self.rows), self.starts, len(self.unit), seed
             )
         if layers:
-            (kernel, bias), (*between, (last, last_bias)) = layers[0], layers[1:]
-            layers = (
+            (kernel, bias), *between, (last, last_bias) = layers
+            scaled = (
                 (kernel / column_scale[:, None], bias),
                 *between,
                 (last * output_unit, last_bias * output_unit),
             )
-            layers = tuple(
-                (kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers
-            )
-            if not all(np.isfinite(each).all() for layer in layers for each in layer):
+            layers = tuple(tuple(np.float32(weights) for weights in layer) for layer in scaled)
+            if not all(np.isfinite(weights).all() for layer in layers for weights in layer):
                 raise InputError(
-                    "Expected telemetry from which the enhancer can learn. Received: a training that diverged. "
+                    "Expected telemetry from which the enhancer can learn. Received: a training "
+                    "that diverged. "
                     "Look for values far from all others, or use --enhancer ridge."
                 )
         return self._enhancer(
@@ -214,17 +236,19 @@ class Training:
         )
 
     def _keeping_the_shape(self, name: str) -> Enhancer:
-        """Fits the two simplest candidates: the most similar coarse column of each channel, unchanged or with a level and a gain."""
-        centred, window = self.inputs - self.centre, self.inputs.shape[1]
-        covariance = np.einsum("wsk,wsc->ck", centred, self.targets - self.middle)
-        power = np.einsum("wsk,wsk->k", centred, centred)
-        safe = np.where(power > 0, power, 1.0)
-        column = np.argmax(covariance**2 / safe, axis=1)
-        if name == COARSE:
-            gain, level = np.ones(len(column)), self.centre[column]
-        else:
-            gain, level = covariance[np.arange(len(column)), column] / safe[column], self.middle
-        return self._enhancer(name, np.tile(level, window), main=(column, gain.astype(np.float32)))
+        """Fits the two simplest candidates: the most similar coarse column of each channel,
+        unchanged or with a level and a gain.
+        """
+        column = most_similar(self.inputs, self.targets)
+        gain = np.ones(len(column))
+        level = self.centre[column]
+        if name == LEVEL_AND_GAIN:
+            covariance, power = covariance_and_power(self.inputs, self.targets)
+            safe = np.where(power > 0, power, 1.0)
+            gain = covariance[np.arange(len(column)), column] / safe[column]
+            level = self.middle
+        bias = np.tile(level, self.inputs.shape[1])
+        return self._enhancer(name, bias, main=(column, gain.astype(np.float32)))
 
     def _enhancer(self, name: str, bias: np.ndarray, *parts: Any, **others: Any) -> Enhancer:
         sizes = *self.inputs.shape[1:], self.targets.shape[2]
@@ -236,7 +260,9 @@ class Training:
 def _train(
     rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Trains the paper's network, whose learning rate falls to zero here; returns kernel and bias of each Dense layer."""
+    """Trains the paper's network, whose learning rate falls to zero here; returns kernel and bias
+    of each Dense layer.
+    """
     from enhsim_tf.common.backend import keras
     from enhsim_tf.paper.enhancer import build_enhancer, train_enhancer
 
@@ -270,14 +296,17 @@ def _deviations(windows: np.ndarray) -> np.ndarray:
 
 
 def block_edges(begin: int, end: int, window: int) -> np.ndarray:
-    """Returns the edges of contiguous blocks of about equal length between two samples; raises InputError if one is shorter than a window."""
+    """Returns the edges of contiguous blocks of about equal length between two samples; raises
+    InputError if one is shorter than a window.
+    """
     num_blocks = int(
         np.clip((end - begin) // (_WINDOWS_IN_BLOCK * window), NUM_FOLDS, _MOST_BLOCKS)
     )
     edges = np.linspace(begin, end, num_blocks + 1).round().astype(np.int64)
     if np.diff(edges).min() < window:
         raise InputError(
-            f"Expected at least {NUM_FOLDS} windows of {window} samples, one after another. Received: {end - begin} samples. "
+            f"Expected at least {NUM_FOLDS} windows of {window} samples, one after another. "
+            f"Received: {end - begin} samples. "
             "Give longer telemetry or a smaller window."
         )
     return edges
@@ -286,14 +315,17 @@ def block_edges(begin: int, end: int, window: int) -> np.ndarray:
 def split_fold(
     starts: np.ndarray, window: int, edges: np.ndarray, fold: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Splits windows, which may overlap, into training windows and held-out windows that share no sample; returns the indices of both.
+    """Splits windows, which may overlap, into training windows and held-out windows that share no
+    sample; returns the indices of both.
 
-    Block `b` is held out if `b % NUM_FOLDS == fold`. A window across the edge of a held-out block is in neither set.
+    Block `b` is held out if `b % NUM_FOLDS == fold`. A window across the edge of a held-out block
+    is in neither set.
     """
     starts = np.asarray(starts)
     inside, touched = np.zeros((2, len(starts)), bool)
     for block in range(fold, len(edges) - 1, NUM_FOLDS):
-        low, high = edges[block], edges[block + 1]
+        low = edges[block]
+        high = edges[block + 1]
         inside |= (starts >= low) & (starts + window <= high)
         touched |= (starts < high) & (starts + window > low)
     return np.flatnonzero(~touched), np.flatnonzero(inside)

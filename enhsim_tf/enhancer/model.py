@@ -1,40 +1,42 @@
-"""A fitted enhancer: maps coarse windows of all columns to telemetry windows of all channels, or a whole run (section 2.2, without TensorFlow)."""
+"""A fitted enhancer: maps coarse windows of all columns to telemetry windows of all channels, or a
+whole run (section 2.2, without TensorFlow).
+"""
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.windows import average_windows, cut, run_starts
+
 _CHUNK = 4_096  # windows that are mapped at a time
-_AVERAGED = 512  # overlapping windows that are enhanced at a time
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Enhancer:
-    """A map from coarse windows to telemetry windows: a linear map, a stack of Dense layers with relu, or the sum of both."""
+    """A map from coarse windows to telemetry windows: a linear map, a stack of Dense layers with
+    relu, or the sum of both.
+    """
 
     name: str  # one of `candidates.CANDIDATES`
     window: int  # samples of a window
     columns: int
     channels: int
-    centre: (
-        np.ndarray
-    )  # of each coarse column, which is subtracted first, float32 of shape `(columns,)`
-    bias: (
-        np.ndarray
-    )  # output for coarse windows at their centre, float32 of shape `(window * channels,)`
-    factors: tuple[
-        np.ndarray, ...
-    ] = ()  # matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs
-    layers: tuple[
-        tuple[np.ndarray, np.ndarray], ...
-    ] = ()  # kernel and bias of each Dense layer of a network beside the linear map
-    main: tuple[np.ndarray, np.ndarray] | None = (
-        None  # for candidates that keep the coarse shape: the column of each channel, and its gain
-    )
+    # of each coarse column, which is subtracted first, float32 of shape `(columns,)`
+    centre: np.ndarray
+    # output for coarse windows at their centre, float32 of shape `(window * channels,)`
+    bias: np.ndarray
+    # matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs
+    factors: tuple[np.ndarray, ...] = ()
+    # kernel and bias of each Dense layer of a network beside the linear map
+    layers: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    # for candidates that keep the coarse shape: the column of each channel, and its gain
+    main: tuple[np.ndarray, np.ndarray] | None = None
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
-        """Maps coarse windows of shape `(windows, samples, columns)` to enhanced windows, float32 of shape `(windows, samples, channels)`."""
+        """Maps coarse windows of shape `(windows, samples, columns)` to enhanced windows, float32
+        of shape `(windows, samples, channels)`.
+        """
         outputs = np.empty((len(inputs), self.window, self.channels), np.float32)
         for first in range(0, len(inputs), _CHUNK):
             self._map(
@@ -42,6 +44,48 @@ class Enhancer:
                 outputs[first : first + _CHUNK],
             )
         return outputs
+
+    def enhance(
+        self, coarse: np.ndarray, shift: np.ndarray | None = None, gain: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Enhances coarse windows of shape `(windows, samples, columns)`; no noise is added (step 5
+        of the paper's pipeline).
+
+        `shift` and `gain` are offset and factor of each window and channel, shape `(windows,
+        channels)`. The result is float32 of shape `(windows, samples, channels)`, in the
+        telemetry's unit. Raises InputError if the shape is wrong or a value is not finite.
+        """
+        if np.ndim(coarse) != 3 or np.shape(coarse)[1:] != (self.window, self.columns):
+            raise InputError(
+                f"Expected coarse windows of shape (windows, {self.window}, {self.columns}). "
+                f"Received: {np.shape(coarse)}."
+            )
+        enhanced = self.predict(coarse)
+        if shift is not None and gain is not None:
+            enhanced *= gain[:, None].astype(np.float32)
+            enhanced += shift[:, None].astype(np.float32)
+        return check_finite(enhanced)
+
+    def enhance_run(self, coarse: np.ndarray) -> np.ndarray:
+        """Enhances one run without gaps, in overlapping windows that are averaged; no noise is
+        added.
+
+        The run has the shape `(samples, columns)` and at least a window of samples; the result is
+        float32 of shape `(samples, channels)`.
+        """
+        coarse = np.asarray(coarse, np.float32)
+        if coarse.ndim != 2 or coarse.shape[1] != self.columns or len(coarse) < self.window:
+            raise InputError(
+                f"Expected a run of shape (samples, {self.columns}) with at least {self.window} "
+                f"samples. Received: {coarse.shape}."
+            )
+        starts = run_starts(len(coarse), self.window)
+        return average_windows(
+            lambda rows: self.enhance(cut([coarse], starts[rows], self.window)),
+            starts,
+            self.window,
+            len(coarse),
+        )
 
     def _map(self, inputs: np.ndarray, outputs: np.ndarray) -> None:
         if self.main is not None:
@@ -66,29 +110,12 @@ class Enhancer:
             flat += rows
 
 
-def run_starts(num_samples: int, window: int, hop: int | None = None) -> np.ndarray:
-    """Returns the starts of windows that cover a run, one each `hop` samples (None: a quarter of a window) and the last one at its end."""
-    return np.unique(
-        np.append(
-            np.arange(0, num_samples - window + 1, hop or max(1, window // 4)), num_samples - window
+def check_finite(windows: np.ndarray) -> np.ndarray:
+    """Returns generated telemetry; raises InputError if a value is not finite."""
+    bad = np.size(windows) - np.count_nonzero(np.isfinite(windows))
+    if bad:
+        raise InputError(
+            f"Expected a simulator that generates finite values. Received: {bad:,} of "
+            f"{np.size(windows):,} values that are not. Fit it again."
         )
-    )
-
-
-def average_windows(
-    windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int
-) -> np.ndarray:
-    """Averages overlapping windows into one series `(num_samples, channels)`, with weights that fall to zero at both ends of a window.
-
-    `windows_at` returns some of the windows, given by a slice of their numbers, and `starts` are their first samples.
-    """
-    fade = (np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2)[:, None]
-    series, total = None, np.zeros((num_samples, 1))
-    for first in range(0, len(starts), _AVERAGED):
-        rows = slice(first, min(first + _AVERAGED, len(starts)))
-        windows = windows_at(rows)
-        series = np.zeros((num_samples, windows.shape[2])) if series is None else series
-        for start, values in zip(starts[rows], windows, strict=True):
-            series[start : start + window] += fade * values
-            total[start : start + window] += fade
-    return (series / total).astype(np.float32)
+    return windows

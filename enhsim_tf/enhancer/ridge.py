@@ -1,6 +1,8 @@
-"""Ridge regression from coarse windows to telemetry windows: what a network has to beat as an enhancer (section 2.2).
+"""Ridge regression from coarse windows to telemetry windows: what a network has to beat as an
+enhancer (section 2.2).
 
-Its penalty is chosen by cross-validation over blocks of time, and the result does not depend on the units of the windows.
+Its penalty is chosen by cross-validation over blocks of time, and the result does not depend on the
+units of the windows.
 """
 
 import dataclasses
@@ -10,9 +12,8 @@ import numpy as np
 
 from enhsim_tf.telemetry.windows import time_blocks
 
-PENALTIES = tuple(
-    float(penalty) for penalty in np.logspace(-3, 6, 19)
-)  # of standardised inputs, so they fit every unit
+# of standardised inputs, so they fit every unit
+PENALTIES = tuple(float(penalty) for penalty in np.logspace(-3, 6, 19))
 _NUM_BLOCKS = 5  # of time, for cross-validation
 _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest value is constant
 
@@ -21,9 +22,8 @@ _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest
 class Ridge:
     """A fitted ridge regression from input windows to target windows; all arrays are float64."""
 
-    factors: tuple[
-        np.ndarray, ...
-    ]  # their product is of shape `(samples * columns, outputs)`: one, or two that hold fewer numbers
+    # their product is of shape `(samples * columns, outputs)`: one, or two that hold fewer numbers
+    factors: tuple[np.ndarray, ...]
     input_mean: np.ndarray  # mean training window, shape `(samples, columns)`
     target_mean: np.ndarray  # mean training target, shape `(outputs,)`
     chosen: tuple[float, ...]  # the penalty of each channel
@@ -50,35 +50,40 @@ def fit_ridge(
     num_channels: int = 1,
     chosen: Sequence[float] | None = None,
 ) -> Ridge:
-    """Fits ridge regression, with a penalty for each channel chosen by cross-validation over blocks of time.
+    """Fits ridge regression, with a penalty for each channel chosen by cross-validation over blocks
+    of time.
 
-    Inputs are centred per sample and divided by one standard deviation per column, so that the result does not depend on
-    units. Samples are not scaled one by one, because that would blow up the rounding errors of constant ones. Among penalties
-    with the same error, the largest is chosen.
+    Inputs are centred per sample and divided by one standard deviation per column, so that the
+    result does not depend on units. Samples are not scaled one by one, because that would blow up
+    the rounding errors of constant ones. Among penalties with the same error, the largest is
+    chosen.
 
     Args:
         inputs: Input windows of shape `(windows, samples)` or `(windows, samples, columns)`.
         targets: Target windows of shape `(windows, outputs)`.
-        starts: First sample of each window, shape `(windows,)`. None: the windows are in the order of time and share no sample.
-        penalties: Penalties to choose from: factors of the sum of squared weights of the standardised inputs.
-        num_channels: Number of channels of the targets. Output `o` belongs to channel `o % num_channels`.
+        starts: First sample of each window, shape `(windows,)`. None: the windows are in the order
+            of time and share no sample.
+        penalties: Penalties to choose from: factors of the sum of squared weights of the
+            standardised inputs.
+        num_channels: Number of channels of the targets. Output `o` belongs to channel `o %
+            num_channels`.
         chosen: Penalty of each channel, if it was chosen before; nothing is cross-validated then.
 
     Returns:
         The regression, fitted to all windows.
     """
-    windows, targets = np.asarray(inputs, np.float64), np.asarray(targets, np.float64)
+    windows = np.asarray(inputs, np.float64)
+    targets = np.asarray(targets, np.float64)
     windows = windows[:, :, None] if windows.ndim == 2 else windows
     starts = np.arange(len(windows)) * windows.shape[1] if starts is None else np.asarray(starts)
     if chosen is None:
         chosen = _choose_penalties(
             windows, targets, starts, np.asarray(penalties, np.float64), num_channels
         )
-    solution, each = (
-        RidgeSolution(windows, targets),
-        np.tile(chosen, targets.shape[1] // num_channels),
-    )
-    left, right = solution.basis / solution.scale[:, None], solution.coefficients(each)
+    solution = RidgeSolution(windows, targets)
+    of_outputs = np.tile(chosen, targets.shape[1] // num_channels)
+    left = solution.basis / solution.scale[:, None]
+    right = solution.coefficients(of_outputs)
     is_low_rank = left.size + right.size < len(left) * right.shape[1]
     factors = (left, right) if is_low_rank else (left @ right,)
     return Ridge(factors, solution.input_mean, solution.target_mean, tuple(map(float, chosen)))
@@ -91,48 +96,55 @@ def _choose_penalties(
     penalties: np.ndarray,
     num_channels: int,
 ) -> list[float]:
-    """Returns the penalty of each channel with the least error on held-out blocks of time; of a single window, the largest."""
-    squares, power = np.zeros((len(penalties), num_channels)), np.zeros(num_channels)
+    """Returns the penalty of each channel with the least error on held-out blocks of time; of a
+    single window, the largest.
+    """
+    squares = np.zeros((len(penalties), num_channels))
+    power = np.zeros(num_channels)
     for training, held_out in time_blocks(starts, _NUM_BLOCKS, windows.shape[1]):
         solution = RidgeSolution(windows[training], targets[training])
-        inner, centred = (
-            solution.project(windows[held_out]),
-            targets[held_out] - solution.target_mean,
-        )
+        inner = solution.project(windows[held_out])
+        centred = targets[held_out] - solution.target_mean
         power += _by_channel((targets[held_out] - targets.mean(axis=0)) ** 2, num_channels)
         for number, penalty in enumerate(penalties):
             squares[number] += _by_channel(
                 (centred - inner @ solution.coefficients(penalty)) ** 2, num_channels
             )
     errors = np.sqrt(squares / np.where(power > 0, power, 1.0))
-    return [penalties[found == found.min()].max() for found in errors.T]
+    return [penalties[channel_errors == channel_errors.min()].max() for channel_errors in errors.T]
 
 
 def _by_channel(squares: np.ndarray, num_channels: int) -> np.ndarray:
-    """Sums squares of outputs, shape `(windows, outputs)`, over windows and samples; returns shape `(channels,)`."""
+    """Sums squares of outputs, shape `(windows, outputs)`, over windows and samples; returns shape
+    `(channels,)`.
+    """
     return squares.sum(axis=0).reshape(-1, num_channels).sum(axis=0)
 
 
 class RidgeSolution:
-    """Ridge regression at every penalty, from one eigendecomposition; windows and targets are those of `fit_ridge`, in float64.
+    """Ridge regression at every penalty, from one eigendecomposition; windows and targets are those
+    of `fit_ridge`, in float64.
 
-    The smaller of the two Gram matrices is decomposed: that of the inputs, or that of the windows if there are fewer windows.
+    The smaller of the two Gram matrices is decomposed: that of the inputs, or that of the windows
+    if there are fewer windows.
     """
 
     def __init__(self, windows: np.ndarray, targets: np.ndarray):
-        self.input_mean, self.target_mean = windows.mean(axis=0), targets.mean(axis=0)
-        deviation = np.sqrt(
-            np.mean((windows - self.input_mean) ** 2, axis=(0, 1))
-        )  # of each column about its mean window
+        self.input_mean = windows.mean(axis=0)
+        self.target_mean = targets.mean(axis=0)
+        # of each column about its mean window
+        deviation = np.sqrt(np.mean((windows - self.input_mean) ** 2, axis=(0, 1)))
         is_constant = deviation <= _ROUNDING * np.abs(windows).max(axis=(0, 1))
         self.scale = np.tile(np.where(is_constant, 1.0, deviation), windows.shape[1])
-        design, outputs = self._standardised(windows), targets - self.target_mean
+        design = self._standardised(windows)
+        outputs = targets - self.target_mean
         if len(design) >= design.shape[1]:
             self.values, self.basis = np.linalg.eigh(design.T @ design)
             self.moments = self.basis.T @ (design.T @ outputs)
         else:
             self.values, vectors = np.linalg.eigh(design @ design.T)
-            self.basis, self.moments = design.T @ vectors, vectors.T @ outputs
+            self.basis = design.T @ vectors
+            self.moments = vectors.T @ outputs
 
     def _standardised(self, windows: np.ndarray) -> np.ndarray:
         return (windows - self.input_mean).reshape(len(windows), -1) / self.scale

@@ -1,1 +1,1 @@
-"""Noise models (section 2.3 of the paper) on windows of noise: Gaussian, autoregression, resampled residual windows."""
+"""Noise models (section 2.3 of the paper): what is added to the enhanced signal."""

@@ -5,7 +5,9 @@ import numpy as np
 from enhsim_tf.paper.square_wave import Signal
 
 MODES = ("stuck", "drift", "gain_loss", "friction", "dropout", "period_change")
-"""Degraded modes: the mechanism stands still, the sensor drifts or loses gain, motion lags, samples are lost, periods grow."""
+"""Degraded modes: the mechanism stands still, the sensor drifts or loses gain, motion lags, samples
+are lost, periods grow.
+"""
 RUN = 10  # samples that `dropout` loses at a time
 
 
@@ -21,7 +23,8 @@ def degrade(
 ) -> np.ndarray:
     """A signal in a degraded mode.
 
-    The signal is a function of time, so that the true signal and the simulation are degraded alike by the same state of `rng`.
+    The signal is a function of time, so that the true signal and the simulation are degraded alike
+    by the same state of `rng`.
 
     Args:
         signal: The nominal signal.
@@ -43,7 +46,9 @@ def degrade(
         raise ValueError(
             f"Expected a mode, nominal or one of {', '.join(MODES)}. Received: {mode!r}."
         )
-    time, late, (low, high) = time.copy(), time[:, onset:], levels
+    late = time[:, onset:]
+    time = time.copy()
+    low, high = levels
     begin = late[:, :1]
 
     # what ails the mechanism changes when the signal happens
@@ -53,7 +58,8 @@ def degrade(
     elif mode == "period_change":
         time[:, onset:] = begin + (late - begin) / (1 + severity)
     elif mode == "friction":
-        quarter, elapsed = shortest_period / 4, late[0] - late[0, 0]
+        quarter = shortest_period / 4
+        elapsed = late[0] - late[0, 0]
         knots = np.arange(0, elapsed[-1] + shortest_period, quarter)
         lags = rng.uniform(0, severity * quarter, (len(time), len(knots)))
         lags[:, 0] = 0
@@ -61,7 +67,8 @@ def degrade(
     values = signal(time)
 
     # what ails the sensor changes its values
-    after, middle = values[:, onset:], (low + high) / 2
+    after = values[:, onset:]
+    middle = (low + high) / 2
     if mode == "drift":
         after += severity * (high - low) * np.linspace(0, 1, after.shape[1])
     elif mode == "gain_loss":

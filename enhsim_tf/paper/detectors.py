@@ -1,4 +1,6 @@
-"""The three detectors with which claims C3 and C8 are measured: small, standard, and different in kind."""
+"""The three detectors with which claims C3 and C8 are measured: small, standard, and different in
+kind.
+"""
 
 from collections.abc import Callable
 
@@ -13,7 +15,9 @@ from enhsim_tf.paper.enhancer import Pairs
 from enhsim_tf.paper.settings import Settings
 
 Score = Callable[[np.ndarray], np.ndarray]
-"""From windows of shape `(windows, samples)` to one number for each; a higher number is more anomalous."""
+"""From windows of shape `(windows, samples)` to one number for each; a higher number is more
+anomalous.
+"""
 
 
 def pca_residual(training: np.ndarray, settings: Settings) -> Score:
@@ -30,7 +34,9 @@ def pca_residual(training: np.ndarray, settings: Settings) -> Score:
 
 
 def isolation_forest(training: np.ndarray, settings: Settings) -> Score:
-    """The anomaly score of an isolation forest (Liu, Ting and Zhou 2008) on fourteen features of each window."""
+    """The anomaly score of an isolation forest (Liu, Ting and Zhou 2008) on fourteen features of
+    each window.
+    """
     forest = IsolationForest(n_estimators=settings.num_trees, random_state=settings.seed).fit(
         window_features(training)
     )
@@ -38,8 +44,11 @@ def isolation_forest(training: np.ndarray, settings: Settings) -> Score:
 
 
 def dense_autoencoder(training: np.ndarray, settings: Settings) -> Score:
-    """The mean squared reconstruction error of a dense autoencoder with 128, 16 and 128 hidden units."""
-    mean, scale = np.mean(training), np.std(training)
+    """The mean squared reconstruction error of a dense autoencoder with 128, 16 and 128 hidden
+    units.
+    """
+    mean = np.mean(training)
+    scale = np.std(training)
     standardised = ((training - mean) / scale).astype(np.float32)
     network = keras.Sequential([keras.Input(training.shape[1:])], name="autoencoder")
     for number, (units, activation) in enumerate(
@@ -66,6 +75,8 @@ DETECTORS = {
 
 
 def threshold(scores: np.ndarray, rate: float) -> float:
-    """The split conformal threshold for a rate of false alarms: the score of rank `ceil((n + 1) (1 - rate))` among `n` held-out ones."""
+    """The split conformal threshold for a rate of false alarms: the score of rank `ceil((n + 1) (1
+    - rate))` among `n` held-out ones, or the highest one.
+    """
     rank = int(np.ceil((len(scores) + 1) * (1 - rate) - 1e-9))
-    return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else float(np.max(scores))
+    return float(np.sort(scores)[min(rank, len(scores)) - 1])

@@ -1,8 +1,9 @@
 """Figures 1 to 14 of the paper; the fourteenth is commented out in its source.
 
-Each function draws one figure from a pipeline, which trains what the figure needs; its docstring is the figure's text alternative, for
-readers who cannot see it. Figures 1 and 11 are drawings that are kept beside this file. Figures 5 to 7, faces of another system's making
-in the paper, have counterparts: real and generated windows in random order.
+Each function draws one figure from a pipeline, which trains what the figure needs; its docstring is
+the figure's text alternative, for readers who cannot see it. Figures 1 and 11 are drawings that are
+kept beside this file. Figures 5 to 7, faces of another system's making in the paper, have
+counterparts: real and generated windows in random order.
 """
 
 import shutil
@@ -38,7 +39,7 @@ from enhsim_tf.common.plot_style import (
 )
 from enhsim_tf.paper.claims import enhancement, noise_resemblance
 from enhsim_tf.paper.enhancer import build_enhancer
-from enhsim_tf.paper.noise import build_discriminator, build_generator, extract_noise
+from enhsim_tf.paper.noise import build_discriminator, build_generator
 from enhsim_tf.paper.pipeline import Pipeline
 
 DRAWINGS = Path(__file__).with_name("drawings")
@@ -54,7 +55,9 @@ Draw = Callable[[Pipeline], matplotlib.figure.Figure | None]
 
 
 def paper_figure(name: str, title: str) -> Callable[[Draw], Draw]:
-    """Makes a function one of `FIGURES`. The function draws the figure, or only describes a drawing that is kept."""
+    """Makes a function one of `FIGURES`. The function draws the figure, or only describes a drawing
+    that is kept.
+    """
 
     def add(draw: Draw) -> Draw:
         FIGURES[name] = Figure(int(name[3:5]), title, " ".join(draw.__doc__.split()), draw)
@@ -73,14 +76,17 @@ def sample(pipeline: Pipeline, part: str, number: int, purpose: str) -> dict[str
 
 @paper_figure("fig01_pipeline", "Enhanced simulation pipeline")
 def pipeline_diagram(pipeline: Pipeline) -> None:
-    """Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector through the generator to noise; their
-    sum is the final output beside real telemetry. Telemetry trains the enhancer, and its noise trains the GAN.
+    """Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector
+    through the generator to noise; their sum is the final output beside real telemetry. Telemetry
+    trains the enhancer, and its noise trains the GAN.
     """
 
 
 @paper_figure("fig02_source_target", "Training source and target time series")
 def training_pairs(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Three training windows: above the coarse simulation, a sum of square waves, below the telemetry of the same time."""
+    """Three training windows: above the coarse simulation, a sum of square waves, below the
+    telemetry of the same time.
+    """
     pairs = sample(pipeline, "train", 3, "figure 2")
     figure, down = new_sheet(
         DOUBLE,
@@ -110,9 +116,12 @@ def enhancer_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 @paper_figure("fig04_enhanced_simulation", "Enhanced simulation")
 def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """A held-out window: the stepped simulation, the enhanced signal and the true signal; below, the difference of the last two."""
+    """A held-out window: the stepped simulation, the enhanced signal and the true signal; below,
+    the difference of the last two.
+    """
     window = sample(pipeline, "test", 1, "figure 4")
-    enhanced, truth = pipeline.enhance(window["coarse"])[0], window["truth"][0]
+    enhanced = pipeline.enhance(window["coarse"])[0]
+    truth = window["truth"][0]
     errors = enhancement(pipeline)
     words = ", ".join(
         f"{name} {errors[f'{key}nrmse']:.3f}"
@@ -122,7 +131,8 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
         DOUBLE,
         3.5,
         "The enhancer turns steps into a waveform",
-        f"A held-out window. Error on all test windows, in standard deviations of the signal: {words}.",
+        "A held-out window. Error on all test windows, in standard deviations of the signal: "
+        f"{words}.",
     )
     above, below = panels(figure, down + 0.1, 2, 1, right=0.85, height_ratios=(3, 1), sharex=True)[
         :, 0
@@ -130,7 +140,7 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     above.plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
     above.plot(window["minutes"], enhanced, color=ENHANCED, linewidth=1.4)
     above.plot(window["minutes"], truth, color=REAL, linewidth=0.8, linestyle=DASHED)
-    name = "true signal" if pipeline.is_example else "telemetry"
+    name = pipeline.truth_name
     label_ends(
         above,
         {
@@ -154,17 +164,15 @@ def guess(
     rng: np.random.Generator,
     hint: str = "",
     columns: int = 4,
+    height: float = 3.14,
 ) -> matplotlib.figure.Figure:
-    """Real and generated rows in random order; which are generated is printed upside down, with a hint that would tell."""
+    """Real and generated rows in random order on a figure of some inches in height; which are
+    generated is printed upside down, with a hint that would tell.
+    """
     is_generated = np.repeat([False, True], [len(real), len(generated)])
     order = rng.permutation(len(is_generated))
     rows = -(-len(order) // columns)
-    figure, down = new_sheet(
-        DOUBLE,
-        (1.24 if columns > 1 else 1.3) + (0.95 if columns > 1 else 0.72) * rows,
-        title,
-        COUNTERPART,
-    )
+    figure, down = new_sheet(DOUBLE, height, title, COUNTERPART)
     axes = panels(figure, down + 0.2, rows, columns, sharex=True, sharey=True)
     for panel, row, letter in zip(
         axes.flat, np.concatenate([real, generated])[order], LETTERS, strict=False
@@ -186,7 +194,8 @@ def guess(
 @paper_figure("fig05_real_or_generated", "Real or generated: windows of telemetry (a counterpart)")
 def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Eight windows of telemetry in random order; four are generated."""
-    rng, real = pipeline.draw("figure 5"), sample(pipeline, "test", 4, "figure 5, real")
+    rng = pipeline.draw("figure 5")
+    real = sample(pipeline, "test", 4, "figure 5, real")
     generated = pipeline.combine(pipeline.windows("test", 4, "figure 5, generated")["coarse"], rng)
     return guess(
         "Which windows of telemetry are generated?", real["minutes"], real["target"], generated, rng
@@ -198,12 +207,11 @@ def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
 )
 def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Eight windows of noise in random order; four are generated."""
-    rng, found = pipeline.draw("figure 6"), noise_resemblance(pipeline)
-    real, minutes = (
-        pipeline.noise_windows("test", 4, "figure 6, real"),
-        sample(pipeline, "test", 1, "figure 6")["minutes"],
-    )
-    hint = f"effective rank: generated {found['rank']:.0f}, real {found['real_rank']:.0f}"
+    rng = pipeline.draw("figure 6")
+    found = noise_resemblance(pipeline)
+    real = pipeline.noise_windows("test", 4, "figure 6, real")
+    minutes = sample(pipeline, "test", 1, "figure 6")["minutes"]
+    hint = f"effective rank: {found['rank_ratio']:.0%} of that of real noise"
     return guess(
         "Which windows of noise are generated?",
         minutes,
@@ -217,7 +225,8 @@ def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
 @paper_figure("fig07_real_or_generated_series", "Real or generated: longer series (a counterpart)")
 def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Four longer series in random order; two are generated."""
-    rng, size = pipeline.draw("figure 7"), pipeline.settings.window
+    rng = pipeline.draw("figure 7")
+    size = pipeline.settings.window
     series = pipeline.parts["test"]
     number = min(4, len(series.values) // size)
     starts = rng.integers(0, len(series.values) - number * size + 1, 4)[:, None] + np.arange(
@@ -235,42 +244,34 @@ def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
         clean + noise,
         rng,
         columns=1,
+        height=4.18,
     )
 
 
 @paper_figure("fig08_source_noise", "Extracted source noise")
 def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Above a window of telemetry with its moving average, below the noise that remains."""
-    settings, window = pipeline.settings, sample(pipeline, "test", 1, "figure 8")
-    series, start = pipeline.parts["test"].values, int(window["start"][0])
-    before = (
-        settings.moving_average // 2
-        if settings.average == "centred"
-        else settings.moving_average - 1
-    )
-    begin = min(max(start, before), len(series) - settings.window - before)
-    noise, average = extract_noise(
-        series[begin - before : begin + settings.window + before],
-        settings.moving_average,
-        settings.average,
-    )
-    noise, average, shown = (
-        noise[: settings.window],
-        average[: settings.window],
-        series[begin : begin + settings.window],
-    )
+    settings = pipeline.settings
+    window = sample(pipeline, "test", 1, "figure 8")
+    series = pipeline.parts["test"].values
+    noise = pipeline.noise_series("test")
+    num_cut = len(series) - len(noise)  # samples without a full average
+    first = num_cut // 2 if settings.average == "centred" else num_cut
+    begin = min(window["start"][0], len(noise) - settings.window)
+    shown = series[first + begin :][: settings.window]
+    noise = noise[begin:][: settings.window]
     figure, down = new_sheet(
         DOUBLE,
         3.0,
         "The noise is what a moving average leaves of telemetry",
-        f"Telemetry minus its {settings.average} moving average over {settings.moving_average} samples. "
+        f"Telemetry minus its average ({settings.average}, {settings.moving_average} samples). "
         f"Standard deviation of the noise in this window: {np.std(noise):.3f}.",
     )
     above, below = panels(figure, down + 0.2, 2, 1, sharex=True)[:, 0]
-    above.plot(window["minutes"][: len(shown)], shown, color=REAL, linewidth=0.5)
-    above.plot(window["minutes"][: len(average)], average, color=AVERAGE, linewidth=1.4)
+    above.plot(window["minutes"], shown, color=REAL, linewidth=0.5)
+    above.plot(window["minutes"], shown - noise, color=AVERAGE, linewidth=1.4)
     title_words(above, (("telemetry", REAL), ("moving average", AVERAGE)))
-    below.plot(window["minutes"][: len(noise)], noise, color=REAL, linewidth=0.5)
+    below.plot(window["minutes"], noise, color=REAL, linewidth=0.5)
     title_words(below, (("noise", REAL),))
     name_axes(np.array([[above], [below]]), FACTS)
     return figure
@@ -292,15 +293,19 @@ def discriminator_layers(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 @paper_figure("fig11_gan_training", "GAN training")
 def gan_training(pipeline: Pipeline) -> None:
-    """Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and generated rows, labelled 0. Then the
-    generator learns through the frozen discriminator, with the label reversed to 1.
+    """Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and
+    generated rows, labelled 0. Then the generator learns through the frozen discriminator, with the
+    label reversed to 1.
     """
 
 
 @paper_figure("fig12_accuracy_loss", "Accuracy and loss for real and fake classifications")
 def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Accuracy and loss of the discriminator on real and on generated rows over the iterations, beside chance."""
-    history, last = pipeline.history, pipeline.settings.iterations
+    """Accuracy and loss of the discriminator on real and on generated rows over the iterations,
+    beside chance.
+    """
+    history = pipeline.history
+    last = pipeline.settings.iterations
     chosen = history["iteration"] <= last
     share = np.mean([history[f"accuracy_{name}"][chosen] for name in ("real", "generated")])
     figure, down = new_sheet(
@@ -335,18 +340,20 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 @paper_figure("fig13_combined", "Simulator output, enhanced, with noise added")
 def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """The stepped simulation with the enhanced signal, the enhanced signal with generated noise, and real telemetry of the same time."""
-    window, rng = sample(pipeline, "test", 1, "figure 13"), pipeline.draw("figure 13, noise")
+    """The stepped simulation with the enhanced signal, the enhanced signal with generated noise,
+    and real telemetry of the same time.
+    """
+    window = sample(pipeline, "test", 1, "figure 13")
+    rng = pipeline.draw("figure 13, noise")
     enhanced = pipeline.enhance(window["coarse"])
     noisy = enhanced + pipeline.generate_noise(1, rng)
     rough = [np.std(np.diff(values[0])) for values in (enhanced, noisy, window["target"])]
     figure, down = new_sheet(
         SINGLE,
         3.5,
-        "Generated noise roughens the enhanced signal",
-        "Standard deviation of first differences here: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(
-            *rough
-        ),
+        "Generated noise roughens the signal",
+        "Standard deviation of first differences here: enhanced {:.3f}, with noise {:.3f}, real "
+        "{:.3f}.".format(*rough),
     )
     axes = panels(figure, down + 0.2, 3, 1, sharex=True, sharey=True)
     axes[0, 0].plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
@@ -370,7 +377,8 @@ def stored_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
         DOUBLE,
         2.4,
         "All steps read the telemetry from the store",
-        f"“{telemetry.name}”: {len(telemetry.values):,} samples, one every {telemetry.interval:g} s; the first {len(shown.values):,}.",
+        f"“{telemetry.name}”: {len(telemetry.values):,} samples, one every "
+        f"{telemetry.interval:g} s; the first {len(shown.values):,}.",
     )
     panel = panels(figure, down + 0.1, 1, 1)[0, 0]
     panel.plot(
@@ -449,7 +457,9 @@ def layer_details(layer: keras.layers.Layer) -> str:
 def save_figure(
     name: str, pipeline: Pipeline, folder: Path, caption: str, is_smoke: bool = False
 ) -> None:
-    """Writes one of `FIGURES` as PNG and SVG: copies a kept drawing, or draws it; see `common.figure.save`."""
+    """Writes one of `FIGURES` as PNG and SVG: copies a kept drawing, or draws it; see
+    `common.figure.save`.
+    """
     drawings = list(DRAWINGS.glob(f"{name}.*"))
     if not drawings:
         save(FIGURES[name], name, pipeline, folder, caption, is_smoke)

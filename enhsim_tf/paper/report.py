@@ -1,17 +1,21 @@
-"""What a run writes beside its figures: the box of verdicts, `results.json`, and the whole run on one page, `report.html`.
+"""What a run writes beside its figures: the box of verdicts, `results.json`, and the whole run on
+one page, `report.html`.
 
-The box has the same content on the terminal, in `results.json`, in the report and in the README: for each claim the published verdict,
-which rests on many seeds and several readings, the verdict of this run, and the measurement that decides.
+The box has the same content on the terminal, in `results.json`, in the report and in the README:
+for each claim the published verdict, which rests on many seeds and several readings, the verdict of
+this run, and the measurement that decides.
 """
 
 import base64
 import dataclasses
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import matplotlib.image
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.stages import VERSIONS
@@ -21,22 +25,31 @@ from enhsim_tf.paper.settings import Settings
 
 PUBLISHED = Path(__file__).with_name("published.json")
 UNDECIDED = "undecided"
+# classes of the style sheet
 _KINDS = {
     REPRODUCED: "good",
     PARTLY: "half",
     NOT_REPRODUCED: "bad",
     UNDECIDED: "open",
     NOT_MEASURED: "none",
-}  # classes of the style sheet
+}
 _KINDS |= {words: _KINDS[verdict] for verdict, words in OF_UNTESTED.items()}
+# of a setting, by the type of its value
+_WORDS = {
+    bool: {True: "yes", False: "no"}.get,
+    str: str,
+    int: "{:,}".format,
+    float: "{:,g}".format,
+}
 
 
 def read_published() -> dict[str, Any]:
     """The published verdicts, which the study of readings writes.
 
-    They are `title`, `basis` (what they rest on, in words) and `claims`: for each id `verdict`, `runs` (of the reference: in how many it is
-    reproduced, partly and not), `decided_by` (the reading that decides an undecided claim, or None) and `ranges` (for each measurement
-    with a limit the lowest and the highest value over seeds and processors).
+    They are `title`, `basis` (what they rest on, in words) and `claims`: for each id `verdict`,
+    `runs` (in how many it is reproduced, partly and not), `by_reading` (the same for each deciding
+    reading), `decided_by` (what turns an undecided claim, or None) and `ranges` (for measurements
+    with a limit the lowest and the highest value over these runs).
     """
     return json.loads(PUBLISHED.read_text(encoding="utf-8"))
 
@@ -64,7 +77,8 @@ def box(records: Sequence[Mapping[str, Any]], published: Mapping[str, Any]) -> l
     """The rows of the box, for the records of `claims.judge_all` and the published verdicts."""
     rows = []
     for record in records:
-        known, limit = published["claims"][record["id"]], record["deciding"]
+        known = published["claims"][record["id"]]
+        limit = record["deciding"]
         rows.append(
             {
                 "claim": f"{record['id']} {record['short']}",
@@ -90,19 +104,15 @@ def as_text(rows: Sequence[Mapping[str, str]]) -> str:
 
 
 def decisions(settings: Settings | None = None) -> list[Mapping[str, str]]:
-    """The table of decisions: for each setting its value, what paper and author say, the source, and the reason."""
-    settings, rows = settings or Settings(), []
+    """The table of decisions: for each setting its value, what paper and author say, the source,
+    and the reason.
+    """
+    settings = settings or Settings()
+    rows = []
     for field in dataclasses.fields(Settings):
-        about, value = field.metadata, getattr(settings, field.name)
-        number = (
-            {True: "yes", False: "no"}[value]
-            if isinstance(value, bool)
-            else value
-            if isinstance(value, str)
-            else f"{value:,g}"
-        )
-        if isinstance(value, int) and not isinstance(value, bool):
-            number = f"{value:,}"
+        about = field.metadata
+        value = getattr(settings, field.name)
+        number = _WORDS[type(value)](value)
         words = {key: about[key] for key in ("paper", "author", "source", "why")}
         rows.append({"setting": field.name, "value": f"{number} {about['unit']}".strip(), **words})
     return rows
@@ -126,7 +136,7 @@ def results(
     """
     return {
         "title": title,
-        "published": {name: published[name] for name in ("title", "basis", "claims")},
+        "published": published,
         "box": box(records, published),
         "claims": list(records),
         "seed": settings.seed,
@@ -137,7 +147,9 @@ def results(
 
 
 def write_page(folder: Path, found: Mapping[str, Any], settings: Settings) -> Path:
-    """Writes `report.html` into the folder of the figures, from the content of `results.json`. It loads nothing and runs no script."""
+    """Writes `report.html` into the folder of the figures, from the content of `results.json`. It
+    loads nothing and runs no script.
+    """
     loader = jinja2.FileSystemLoader(Path(__file__).parent)
     environment = jinja2.Environment(
         loader=loader,
@@ -147,18 +159,16 @@ def write_page(folder: Path, found: Mapping[str, Any], settings: Settings) -> Pa
         lstrip_blocks=True,
     )
     environment.filters |= {"short": short, "needed": needed, "kind": _KINDS.get}
-    pictures, rows = (
-        [_picture(folder, name, found["claims"]) for name in FIGURES],
-        decisions(settings),
-    )
+    pictures = [_picture(folder, name, found["claims"]) for name in FIGURES]
+    rows = decisions(settings)
     text = environment.get_template("report.html.jinja").render(
         found=found,
         pictures=pictures,
         numbers={picture["name"]: picture["number"] for picture in pictures},
         widest=max(picture["width"] for picture in pictures),
-        tally=_tally([record["verdict"] for record in found["claims"]]),
+        tally=Counter(record["verdict"] for record in found["claims"]),
         decisions=rows,
-        sources=_tally([row["source"] for row in rows]),
+        sources=Counter(row["source"] for row in rows),
         is_smoke=found["budget"] == "smoke",
     )
     with replace_file(folder / "report.html") as temporary:
@@ -167,15 +177,9 @@ def write_page(folder: Path, found: Mapping[str, Any], settings: Settings) -> Pa
 
 
 def _picture(folder: Path, name: str, records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    png = (folder / f"{name}.png").read_bytes()
-    width, height = (
-        int.from_bytes(png[at : at + 4], "big") for at in (16, 20)
-    )  # where a PNG keeps them
-    svg = f"data:image/svg+xml;base64,{base64.b64encode((folder / f'{name}.svg').read_bytes()).decode()}"
+    height, width, _ = matplotlib.image.imread(folder / f"{name}.png").shape
+    drawing = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
+    svg = f"data:image/svg+xml;base64,{drawing}"
     about = {key: getattr(FIGURES[name], key) for key in ("number", "title", "alt")}
     shown_by = [record for record in records if record["figure"] == name]
     return about | {"name": name, "width": width, "height": height, "svg": svg, "records": shown_by}
-
-
-def _tally(words: Sequence[str]) -> dict[str, int]:
-    return {word: words.count(word) for word in dict.fromkeys(words)}

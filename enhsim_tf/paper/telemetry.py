@@ -1,4 +1,5 @@
-"""Section 2: the example telemetry, and the store in which it is placed and from which it is read back.
+"""Section 2: the example telemetry, and the store in which it is placed and from which it is read
+back.
 
 "For this example, the signals are synthesized sin waves with periods of 8 and 2 minutes."
 """
@@ -16,7 +17,9 @@ from enhsim_tf.paper.settings import Settings
 
 START = "2020-01-01T00:00:00Z"
 PARTS = {"train": 0.5, "calibration": 0.25, "test": 0.25}
-"""Shares of the parts of the telemetry. Detectors trained on telemetry get their thresholds on the second one."""
+"""Shares of the parts of the telemetry. Detectors trained on telemetry get their thresholds on the
+second one.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,14 +114,18 @@ def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetr
     The moving average of `average` samples shortens the noise of a part.
 
     Raises:
-        InputError: If a part would be too short for ten windows of noise that begin at different samples.
+        InputError: If a part would be too short for ten windows of noise that begin at different
+            samples.
     """
-    usable, parts, first = len(telemetry.values) - 2 * window, {}, 0
+    usable = len(telemetry.values) - 2 * window
+    parts = {}
+    first = 0
     for name, share in PARTS.items():
         stop = first + int(usable * share)
-        if stop - first < window + average + 9:
+        if stop - first < window + average + 8:
             raise InputError(
-                f"Expected at least {4 * (window + average + 10) + 2 * window:,} samples of telemetry. "
+                f"Expected at least {4 * (window + average + 8) + 2 * window:,} samples of "
+                "telemetry. "
                 f"Received: {len(telemetry.values):,}. Use a longer series."
             )
         parts[name] = telemetry.part(first, stop)
@@ -129,7 +136,9 @@ def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetr
 def random_starts(
     num_samples: int, window: int, number: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """First samples of windows "whose beginning and end are offset by a random amount so that all sample sizes are the same"."""
+    """First samples of windows "whose beginning and end are offset by a random amount so that all
+    sample sizes are the same".
+    """
     return rng.integers(0, num_samples - window + 1, number)
 
 

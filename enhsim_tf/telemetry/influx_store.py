@@ -1,6 +1,8 @@
-"""One series in InfluxDB 2, the kind of database at the end of the paper's pipeline, through the official client, an optional extra.
+"""One series in InfluxDB 2, the kind of database at the end of the paper's pipeline, through the
+official client, an optional extra.
 
-Every failure raises an `InputError` of one line. Only the client holds the token: no message, log or pickled copy of a store contains it.
+Every failure raises an `InputError` of one line. Only the client holds the token: no message, log
+or pickled copy of a store contains it.
 """
 
 import dataclasses
@@ -8,7 +10,7 @@ import itertools
 import os
 import re
 import urllib.parse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,17 +23,13 @@ VARIABLES = ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG")
 
 _Answer = TypeVar("_Answer")
 _SHOWN = 3  # number of series listed in a message
-_RANGE = "start: time(v: -9223372036000000000), stop: time(v: 9223372036854775806)"  # all times that InfluxDB has, from a whole second
-_URL = r"https?://(?:[\w.-]+|\[[\da-fA-F:.]+\])(?::[1-9]\d{0,4})?(?:/[!-~]*)?"  # without a name or a password
+# all times that InfluxDB has, from a whole second
+_RANGE = "start: time(v: -9223372036000000000), stop: time(v: 9223372036854775806)"
+# without a name or a password
+_URL = r"https?://(?:[\w.-]+|\[[\da-fA-F:.]+\])(?::[1-9]\d{0,4})?(?:/[!-~]*)?"
 _TIMEOUT_MS = 60_000  # of a request, unless INFLUXDB_V2_TIMEOUT is set; a disk may be slow
-_MAY_PASS = (
-    408,
-    429,
-    500,
-    502,
-    503,
-    504,
-)  # HTTP status codes of a server that is busy or still starting
+# HTTP status codes of a server that is busy or still starting
+_MAY_PASS = (408, 429, 500, 502, 503, 504)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,9 +39,8 @@ class InfluxLocation:
     bucket: str
     measurement: str
     field: str
-    tags: tuple[
-        tuple[str, str], ...
-    ] = ()  # pairs of tag and value that all points of the series have
+    # pairs of tag and value that all points of the series have
+    tags: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
         path = "/".join(map(_encode, (self.bucket, self.measurement, self.field)))
@@ -52,7 +49,8 @@ class InfluxLocation:
 
 
 def parse_location(text: str) -> InfluxLocation:
-    """Parses `influxdb://bucket/measurement/field?tag=value&...`, with `/`, `?`, `&`, `=` and `%` percent-encoded in names.
+    """Parses `influxdb://bucket/measurement/field?tag=value&...`, with `/`, `?`, `&`, `=` and `%`
+    percent-encoded in names.
 
     Raises:
         InputError: If the text does not have this form.
@@ -74,7 +72,8 @@ def parse_location(text: str) -> InfluxLocation:
             raise ValueError
     except ValueError:
         raise InputError(
-            f"Expected {SCHEME}bucket/measurement/field?tag=value, each tag once. Received: {text!r}. Percent-encode /, ?, &, = and % in names."
+            f"Expected {SCHEME}bucket/measurement/field?tag=value, each tag once. Received: "
+            f"{text!r}. Percent-encode /, ?, &, = and % in names."
         ) from None
     return InfluxLocation(bucket, measurement, field, tuple(sorted(tags.items())))
 
@@ -82,12 +81,14 @@ def parse_location(text: str) -> InfluxLocation:
 class InfluxStore:
     """A series in InfluxDB 2.
 
-    The server is set by the environment variables of the official client: `INFLUXDB_V2_URL`, `INFLUXDB_V2_TOKEN` and
-    `INFLUXDB_V2_ORG`, and optional ones such as `INFLUXDB_V2_TIMEOUT` and `INFLUXDB_V2_SSL_CA_CERT`. If a server that has answered stops
-    answering, the client asks it again for a minute; one that has not answered is not waited for.
+    The server is set by the environment variables of the official client: `INFLUXDB_V2_URL`,
+    `INFLUXDB_V2_TOKEN` and `INFLUXDB_V2_ORG`, and optional ones such as `INFLUXDB_V2_TIMEOUT` and
+    `INFLUXDB_V2_SSL_CA_CERT`. If a server that has answered stops answering, the client asks it
+    again for a minute; one that has not answered is not waited for.
 
     Args:
-        location: The location, as `influxdb://bucket/measurement/field?tag=value` or as an `InfluxLocation`.
+        location: The location, as `influxdb://bucket/measurement/field?tag=value` or as an
+            `InfluxLocation`.
 
     Raises:
         InputError: If the location or a variable cannot be used, or if the client is not installed.
@@ -99,7 +100,8 @@ class InfluxStore:
             import influxdb_client  # noqa: F401
         except ImportError:
             raise InputError(
-                "Expected the package influxdb-client. Received: it is not installed. Run python -m pip install influxdb-client."
+                "Expected the package influxdb-client. Received: it is not installed. Run python "
+                "-m pip install influxdb-client."
             ) from None
         self.url, self.organisation = _check_variables()
 
@@ -110,20 +112,35 @@ class InfluxStore:
         """Checks the connection to the server with an empty query.
 
         Raises:
-            InputError: If the server does not answer, does not accept the token, or has no such organisation or bucket.
+            InputError: If the server does not answer, does not accept the token, or has no such
+                organisation or bucket.
         """
-        query = f"from(bucket: {_quote(self.location.bucket)}) |> range(start: time(v: 0), stop: time(v: 1)) |> limit(n: 1)"
-        self._request(lambda client: client.query_api().query(query))
+        self._with_client(self._ask)
+
+    def _ask(self, client: Any) -> None:
+        """Sends an empty query. What fails from then on is repeated, because the server has
+        answered.
+        """
+        query = (
+            f"from(bucket: {_quote(self.location.bucket)}) |> range(start: time(v: 0), stop: "
+            "time(v: 1)) |> limit(n: 1)"
+        )
+        client.query_api().query(query)
+        pools = client.api_client.rest_client.pool_manager
+        pools.connection_pool_kw["retries"] = _retry(16)
+        pools.clear()  # those of the query
 
     def write(self, times: np.ndarray, values: np.ndarray) -> None:
-        """Writes points. A point that is written twice is stored once, so an interrupted write can be repeated.
+        """Writes points. A point that is written twice is stored once, so an interrupted write can
+        be repeated.
 
         Args:
             times: Nanoseconds since 1970, int64 of shape `(samples,)`.
             values: Finite numbers, shape `(samples,)`.
 
         Raises:
-            InputError: If InfluxDB cannot store a value or a name, or if the server does not accept the points.
+            InputError: If InfluxDB cannot store a value or a name, or if the server does not accept
+                the points.
         """
         from influxdb_client import Point
         from influxdb_client.client.write_api import SYNCHRONOUS
@@ -132,7 +149,8 @@ class InfluxStore:
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise InputError(
-                f"Expected finite values. Received: {values[bad[0]]} at sample {bad[0]}, which InfluxDB cannot store. Fill or cut it."
+                f"Expected finite values. Received: {values[bad[0]]} at sample {bad[0]}, which "
+                "InfluxDB cannot store. Fill or cut it."
             )
         names = (place.measurement, place.field, *(part for pair in place.tags for part in pair))
         wrong = [
@@ -145,7 +163,8 @@ class InfluxStore:
         ]
         if wrong:
             raise InputError(
-                "Expected names without control characters, a backslash at the end or _ or # at the beginning, and none that is time. "
+                "Expected names without control characters, a backslash at the end or _ or # at "
+                "the beginning, and none that is time. "
                 f"Received: {wrong[0]!r}. Write to another location."
             )
         point = {
@@ -156,9 +175,9 @@ class InfluxStore:
         begin = Point.from_dict(point).to_line_protocol().removesuffix("true")
 
         def send(client: Any) -> None:
-            api = client.write_api(
-                SYNCHRONOUS
-            )  # its own writer of data frames is not used: it evaluates the names of tags as code
+            self._ask(client)
+            # its own writer of data frames is not used: it evaluates the names of tags as code
+            api = client.write_api(SYNCHRONOUS)
             for first in range(0, len(values), BATCH):
                 # float32 to float64 is exact, and so is the shortest decimal form of the float64
                 batch = zip(
@@ -168,17 +187,18 @@ class InfluxStore:
                 lines = "\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch])
                 api.write(place.bucket, record=lines.encode(), write_precision="ns")
 
-        self.check()
-        self._request(send, retries=16)
+        self._with_client(send)
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Reads all points of the only series at the location, whichever program wrote it.
 
         Returns:
-            Times in nanoseconds since 1970 (int64), which increase, and values (float64), two arrays of the same length.
+            Times in nanoseconds since 1970 (int64), which increase, and values (float64), two
+            arrays of the same length.
 
         Raises:
-            InputError: If there is no series, more than one, or one without numbers, or if the server does not answer.
+            InputError: If there is no series, more than one, or one without numbers, or if the
+                server does not answer.
         """
         from influxdb_client import Dialect
 
@@ -188,63 +208,71 @@ class InfluxStore:
         matches = " and ".join(
             f"r[{_quote(column)}] == {_quote(value)}" for column, value in wanted.items()
         )
-        points = f"from(bucket: {_quote(self.location.bucket)}) |> range({_RANGE}) |> filter(fn: (r) => {matches})"
-        rows = self._request(
-            lambda client: list(
-                itertools.islice(client.query_api().query_stream(f"{points} |> first()"), _SHOWN)
-            )
+        points = (
+            f"from(bucket: {_quote(self.location.bucket)}) |> range({_RANGE}) |> filter(fn: (r) => "
+            f"{matches})"
         )
-        tags = [
-            {
-                key: value
-                for key, value in row.values.items()
-                if not key.startswith("_") and key not in ("result", "table")
-            }
-            for row in rows
-        ]
-        if len(rows) > 1:
-            found = " or ".join(
-                str(dataclasses.replace(self.location, tags=tuple(sorted(each.items()))))
-                for each in tags
-            )
-            raise InputError(
-                f"Expected one series at {self.location}. Received: several. Name one by its tags: {found}."
-            )
+        plain = Dialect(annotations=[])
+
+        def query(client: Any) -> bytes:
+            self._ask(client)
+            api = client.query_api()
+            rows = list(itertools.islice(api.query_stream(f"{points} |> first()"), _SHOWN))
+            self._check_single(rows)
+            values = f'{points} |> keep(columns: ["_time", "_value"])'
+            return api.query_raw(values, dialect=plain).read()
+
+        return _parse(self._with_client(query))
+
+    def _check_single(self, rows: Sequence[Any]) -> None:
+        """Raises InputError unless the rows, one of each series, are one."""
         if not rows:
             raise InputError(
-                f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags."
+                f"Expected points at {self.location}. Received: none. Correct the measurement, the "
+                "field or the tags."
             )
-        query, plain = f'{points} |> keep(columns: ["_time", "_value"])', Dialect(annotations=[])
-        return _parse(
-            self._request(
-                lambda client: client.query_api().query_raw(query, dialect=plain).read(), retries=16
+        if len(rows) > 1:
+            tags = [
+                {
+                    key: value
+                    for key, value in row.values.items()
+                    if not key.startswith("_") and key not in ("result", "table")
+                }
+                for row in rows
+            ]
+            places = " or ".join(
+                str(dataclasses.replace(self.location, tags=tuple(sorted(pairs.items()))))
+                for pairs in tags
             )
-        )
+            raise InputError(
+                f"Expected one series at {self.location}. Received: several. Name one by its tags: "
+                f"{places}."
+            )
 
-    def _request(self, request: Callable[[Any], _Answer], retries: int = 0) -> _Answer:
-        """Calls a function with the client, which repeats what may pass; raises an `InputError` if that does not succeed."""
+    def _with_client(self, work: Callable[[Any], _Answer]) -> _Answer:
+        """Calls a function with a client, which is closed then; raises an `InputError` if the
+        server does not do what it asks for.
+        """
         from influxdb_client import InfluxDBClient
         from influxdb_client.client.flux_csv_parser import (
             FluxCsvParserException,
             FluxQueryException,
         )
         from influxdb_client.rest import ApiException
-        from urllib3 import Retry
         from urllib3.exceptions import HTTPError
 
-        options = {
-            "redirect": False,
-            "allowed_methods": None,
-            "status_forcelist": _MAY_PASS,
-            "raise_on_status": False,
-        }
         try:
-            client = InfluxDBClient.from_env_properties(
-                retries=Retry(retries, backoff_factor=0.1, backoff_max=5, **options)
-            )
-            if "INFLUXDB_V2_TIMEOUT" not in os.environ:
-                client.api_client.configuration.timeout = _TIMEOUT_MS
-            return request(client)
+            client = InfluxDBClient.from_env_properties(retries=_retry(0))
+        except ValueError:
+            raise InputError(
+                "Expected numbers in INFLUXDB_V2_TIMEOUT and INFLUXDB_V2_CONNECTION_POOL_MAXSIZE. "
+                "Received: others. Correct them."
+            ) from None
+        if "INFLUXDB_V2_TIMEOUT" not in os.environ:
+            client.api_client.configuration.timeout = _TIMEOUT_MS
+        try:
+            with client:
+                return work(client)
         except (
             ApiException,
             FluxQueryException,
@@ -259,44 +287,75 @@ class InfluxStore:
                 ).split()
             )[:300]
             if status == 401:
-                words = f"Expected a token that {self.url} knows. Received: another in {VARIABLES[1]}. Copy it again."
+                words = (
+                    f"Expected a token that {self.url} knows. Received: another in {VARIABLES[1]}. "
+                    "Copy it again."
+                )
             elif isinstance(error, FluxCsvParserException) or (status == 404 and "not" not in said):
-                words = f"Expected an InfluxDB 2 server at {self.url}. Received: an answer of something else. Correct {VARIABLES[0]}."
+                words = (
+                    f"Expected an InfluxDB 2 server at {self.url}. Received: an answer of "
+                    f"something else. Correct {VARIABLES[0]}."
+                )
             elif isinstance(error, HTTPError | OSError):
-                words = f"Expected an InfluxDB 2 server at {self.url}. Received: no answer. Start it or correct {VARIABLES[0]}."
+                words = (
+                    f"Expected an InfluxDB 2 server at {self.url}. Received: no answer. Start it "
+                    f"or correct {VARIABLES[0]}."
+                )
             else:
                 words = (
-                    f"Expected a request that {self.url} accepts, to bucket {self.location.bucket!r} of {VARIABLES[2]}={self.organisation!r}. "
-                    f"Received: {said} ({status or 'query'}). Correct the names, or give the token the right."
+                    f"Expected a request that {self.url} accepts, to bucket "
+                    f"{self.location.bucket!r} of {VARIABLES[2]}={self.organisation!r}. "
+                    f"Received: {said} ({status or 'query'}). Correct the names, or give the token "
+                    "the right."
                 )
-        except ValueError:
-            words = "Expected numbers in INFLUXDB_V2_TIMEOUT and INFLUXDB_V2_CONNECTION_POOL_MAXSIZE. Received: others. Correct them."
-        raise InputError(
-            words
-        )  # outside the except block: the client's own error, which may contain the token, is not chained
+        # outside the except block: the client's own error, which may contain the token, is not
+        # chained
+        raise InputError(words)
+
+
+def _retry(number: int) -> Any:
+    """Returns how often a request is repeated that may pass."""
+    from urllib3 import Retry
+
+    return Retry(
+        number,
+        redirect=False,
+        allowed_methods=None,
+        status_forcelist=_MAY_PASS,
+        raise_on_status=False,
+        backoff_factor=0.1,
+        backoff_max=5,
+    )
 
 
 def _check_variables() -> tuple[str, str]:
-    """Checks the environment variables that the client reads, whose own errors would show the token; returns URL and organisation."""
+    """Checks the environment variables that the client reads, whose own errors would show the
+    token; returns URL and organisation.
+    """
     missing = [name for name in VARIABLES if not os.environ.get(name, "").strip()]
     if missing:
         raise InputError(
-            f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them."
+            f"Expected the variables {', '.join(VARIABLES)}. Received: no "
+            f"{' and no '.join(missing)}. Set them."
         )
     url, token, organisation = (os.environ[name] for name in VARIABLES)
     if not re.fullmatch(_URL, url):
         raise InputError(
-            "Expected INFLUXDB_V2_URL like http://localhost:8086, without a name or a password. Received: another. Correct it."
+            "Expected INFLUXDB_V2_URL like http://localhost:8086, without a name or a password. "
+            "Received: another. Correct it."
         )
     if not (token.isascii() and token.isprintable()):
         raise InputError(
-            "Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: a line break or other characters in it. Copy it again."
+            "Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: a line break or other "
+            "characters in it. Copy it again."
         )
     return url.rstrip("/"), organisation
 
 
 def _parse(answer: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Parses the CSV of an answer as times and values. The client's own parser cuts times to microseconds."""
+    """Parses the CSV of an answer as times and values. The client's own parser cuts times to
+    microseconds.
+    """
     import pyarrow as pa
     import pyarrow.csv
 
@@ -307,13 +366,16 @@ def _parse(answer: bytes) -> tuple[np.ndarray, np.ndarray]:
     except pa.ArrowException as error:
         reason = " ".join(str(error).split())[:200]
         raise InputError(
-            f"Expected a field of numbers. Received: {reason}. Name another field, or see the server's log."
+            f"Expected a field of numbers. Received: {reason}. Name another field, or see the "
+            "server's log."
         ) from None
     return table["_time"].cast(pa.int64()).to_numpy(), table["_value"].to_numpy()
 
 
 def _quote(text: str) -> str:
-    """Quotes a text as a Flux string. Characters that could end it or start an interpolated expression are escaped as hex codes."""
+    """Quotes a text as a Flux string. Characters that could end it or start an interpolated
+    expression are escaped as hex codes.
+    """
     return '"' + re.sub(r'[\\"$\x00-\x1f\x7f]', lambda found: f"\\x{ord(found[0]):02x}", text) + '"'
 
 

@@ -1,13 +1,16 @@
 """Quantised telemetry: the levels of a channel, and rounding to them."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 _OFTEN = 3  # a value of quantised telemetry counts as a level if it occurs at least this often
 _LEAST_SHARE = 0.99  # of the values that must be levels; the others may be interpolated
 _UNEVEN = 0.1  # largest deviation of a level from a multiple of the step, in steps
-_SAME = 1e-6  # values closer than this share of their range are one level: the difference of two float32 series is not exactly on the grid
+# values closer than this share of their range are one level: the difference of two float32 series
+# is not exactly on the grid
+_SAME = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,7 +26,8 @@ class Levels:
         """Finds the levels of telemetry.
 
         Args:
-            values: The telemetry, of any shape. A few values between the levels, such as interpolated ones, are ignored.
+            values: The telemetry, of any shape. A few values between the levels, such as
+                interpolated ones, are ignored.
 
         Returns:
             The levels, or None if the telemetry is not quantised.
@@ -36,16 +40,17 @@ class Levels:
             return None
         step = float(np.diff(often).min())
         multiples = (often - often[0]) / step
-        if (
-            np.abs(multiples - np.round(multiples)).max() >= _UNEVEN
-        ):  # values of a noise-free wave repeat too, but are not evenly spaced
+        # values of a noise-free wave repeat too, but are not evenly spaced
+        if np.abs(multiples - np.round(multiples)).max() >= _UNEVEN:
             return None
         # float32 values deviate from the grid; the longest distance gives the step most precisely
         steps = round(multiples[-1])
         return cls(float(often[-1] - often[0]) / steps, float(often[0]), len(often))
 
     def round(self, values: np.ndarray) -> np.ndarray:
-        """Rounds values to the nearest level, which may lie beyond those that occurred; float32 of the same shape."""
+        """Rounds values to the nearest level, which may lie beyond those that occurred; float32 of
+        the same shape.
+        """
         return (
             self.origin
             + self.step * np.rint((np.asarray(values, np.float64) - self.origin) / self.step)
@@ -53,9 +58,11 @@ class Levels:
 
 
 def _distinct(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the distinct values in rising order and how often each occurs. Values that differ by a rounding error are one value.
+    """Returns the distinct values in rising order and how often each occurs. Values that differ by
+    a rounding error are one value.
 
-    A run of many values, each close to the next, is not one value: where values are that dense, they are returned as they are.
+    A run of many values, each close to the next, is not one value: where values are that dense,
+    they are returned as they are.
     """
     distinct, counts = np.unique(np.asarray(values, np.float64), return_counts=True)
     same = _SAME * (distinct[-1] - distinct[0])
@@ -65,3 +72,13 @@ def _distinct(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return distinct, counts
     numbers = np.add.reduceat(counts, first)
     return np.add.reduceat(distinct * counts, first) / numbers, numbers
+
+
+def rounded(values: np.ndarray, quantisation: Sequence[Levels | None]) -> np.ndarray:
+    """Rounds quantised channels, the last axis, to their levels in place, and returns the
+    values.
+    """
+    for channel, levels in enumerate(quantisation):
+        if levels is not None:
+            values[..., channel] = levels.round(values[..., channel])
+    return values

@@ -1,17 +1,24 @@
 """Windows of a series: the starts of windows, where they lie, and splitting them by time.
 
-The start of a window is the index of its first sample. In a series of several parts, starts are counted over the samples at which a
-complete window can start, part after part, so that they are the sample numbers if there is one part. In all functions, `parts` are
-contiguous parts of one series, `window` is the number of samples in a window, and `starts` has the shape `(windows,)`.
+The start of a window is the index of its first sample. In a series of several parts, starts are
+counted over the samples at which a complete window can start, part after part, so that they are the
+sample numbers if there is one part. In all functions, `parts` are contiguous parts of one series,
+`window` is the number of samples in a window, and `starts` has the shape `(windows,)`.
 """
 
-from collections.abc import Sequence, Sized
+from collections.abc import Callable, Sequence, Sized
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
-_LEAST_SHARE = 0.25  # of the windows outside a block that must remain where those that overlap the block are left out
+if TYPE_CHECKING:
+    from enhsim_tf.telemetry.series import Telemetry
+
+# of the windows outside a block that must remain where those that overlap the block are left out
+_LEAST_SHARE = 0.25
+_AVERAGED = 512  # overlapping windows that are averaged at a time
 
 
 def num_window_starts(parts: Sequence[Sized], window: int) -> int:
@@ -19,10 +26,21 @@ def num_window_starts(parts: Sequence[Sized], window: int) -> int:
     return sum(max(0, len(part) - window + 1) for part in parts)
 
 
+def longest_window(parts: Sequence[Sized], most: int, least: int, number: int) -> int | None:
+    """Returns the longest window, of at most `most` and at least `least` samples, of which the
+    parts hold so many; None if there is none. Parts shorter than a window do not count.
+    """
+    lengths = np.array([len(part) for part in parts])
+    windows = range(most, least - 1, -1)
+    enough = (window for window in windows if lengths[lengths >= window].sum() >= number * window)
+    return next(enough, None)
+
+
 def random_window_starts(
     parts: Sequence[Sized], window: int, num_windows: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """Draws window starts uniformly from all samples at which a complete window can start, with replacement.
+    """Draws window starts uniformly from all samples at which a complete window can start, with
+    replacement.
 
     In the paper, the "beginning and end" of windows "are offset by a random amount" (section 2.2).
 
@@ -33,13 +51,16 @@ def random_window_starts(
     if not num_starts:
         longest = max((len(part) for part in parts), default=0)
         raise InputError(
-            f"Expected a contiguous part of at least {window} samples. Received: {longest}. Use a longer series or a shorter window."
+            f"Expected a contiguous part of at least {window} samples. Received: {longest}. Use a "
+            "longer series or a shorter window."
         )
     return rng.integers(0, num_starts, num_windows)
 
 
 def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) -> np.ndarray:
-    """Returns window starts that are evenly spaced over the series, in the order of time; if fewer than `num_windows` are possible, all."""
+    """Returns window starts that are evenly spaced over the series, in the order of time; if fewer
+    than `num_windows` are possible, all.
+    """
     num_starts = num_window_starts(parts, window)
     return np.unique(np.linspace(0, num_starts - 1, min(num_windows, num_starts)).astype(np.int64))
 
@@ -47,7 +68,9 @@ def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) 
 def places_in_parts(
     parts: Sequence[Sized], starts: np.ndarray, window: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns where each window lies: the number of its part, among those that are long enough, and its first sample there."""
+    """Returns where each window lies: the number of its part, among those that are long enough, and
+    its first sample there.
+    """
     firsts = np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
     which = np.searchsorted(firsts, starts, "right") - 1
     return which, np.asarray(starts) - firsts[which]
@@ -58,12 +81,12 @@ def time_blocks(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Splits windows into blocks of time for cross-validation.
 
-    Training windows that overlap the time of the held-out block are left out, if at least a quarter of the windows outside
-    the block remains.
+    Training windows that overlap the time of the held-out block are left out, if at least a quarter
+    of the windows outside the block remains.
 
     Returns:
-        `(training, held_out)` for each of `num_blocks` blocks, or of as many as there are windows: indices of windows in the order of
-        time. Empty for a single window.
+        `(training, held_out)` for each of `num_blocks` blocks, or of as many as there are windows:
+        indices of windows in the order of time. Empty for a single window.
     """
     order = np.argsort(starts, kind="stable")
     if len(order) < 2:
@@ -71,14 +94,17 @@ def time_blocks(
     blocks = []
     for held_out in np.array_split(order, max(2, min(num_blocks, len(order)))):
         rest = order[~np.isin(order, held_out)]
-        first, last = starts[held_out[0]], starts[held_out[-1]]
+        first = starts[held_out[0]]
+        last = starts[held_out[-1]]
         apart = rest[(starts[rest] <= first - window) | (starts[rest] >= last + window)]
         blocks.append((apart if len(apart) >= max(1, _LEAST_SHARE * len(rest)) else rest, held_out))
     return blocks
 
 
 def runs_of(marks: np.ndarray) -> list[tuple[int, int]]:
-    """Returns the first sample and the end (exclusive) of each run of true samples, of marks of shape `(samples,)`."""
+    """Returns the first sample and the end (exclusive) of each run of true samples, of marks of
+    shape `(samples,)`.
+    """
     edges = np.flatnonzero(np.diff(np.asarray(marks, bool), prepend=False, append=False))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -86,15 +112,82 @@ def runs_of(marks: np.ndarray) -> list[tuple[int, int]]:
 def mean_over_windows(
     scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int
 ) -> np.ndarray:
-    """Converts scores of windows to scores of samples: the mean score of the windows that contain a sample.
+    """Converts scores of windows to scores of samples: the mean score of the windows that contain a
+    sample.
 
-    Samples after the end of the last window receive the score of the last window. Windows begin at `begins`, in ascending order from 0,
-    with steps of at most `window`.
+    Samples after the end of the last window receive the score of the last window. Windows begin at
+    `begins`, in ascending order from 0, with steps of at most `window`.
     """
-    steps = np.zeros((2, num_samples + 1))
-    for sign, places in ((1, begins), (-1, begins + window)):
-        np.add.at(steps[0], places, sign * scores)
-        np.add.at(steps[1], places, sign)
     end = begins[-1] + window
-    total, number = np.cumsum(steps[:, :end], axis=1)
+    samples = np.arange(end)
+    first = np.searchsorted(begins, samples - window, "right")
+    number = np.searchsorted(begins, samples, "right") - first
+    # no difference of running sums: after one very large score, it would keep its rounding error
+    total = np.zeros(end)
+    for place in range(number.max()):
+        holds = place < number
+        total[holds] += scores[first[holds] + place]
     return np.append(total / number, np.full(num_samples - end, scores[-1]))
+
+
+def run_starts(num_samples: int, window: int, hop: int | None = None) -> np.ndarray:
+    """Returns the starts of windows that cover a run, one each `hop` samples (None: a quarter of a
+    window) and the last one at its end.
+    """
+    return np.unique(
+        np.append(
+            np.arange(0, num_samples - window + 1, hop or max(1, window // 4)), num_samples - window
+        )
+    )
+
+
+def average_windows(
+    windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int
+) -> np.ndarray:
+    """Averages overlapping windows into one series `(num_samples, channels)`, with weights that
+    fall to zero at both ends of a window.
+
+    `windows_at` returns some of the windows, given by a slice of their numbers, and `starts` are
+    their first samples.
+    """
+    fade = (np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2)[:, None]
+    series = None
+    total = np.zeros((num_samples, 1))
+    for first in range(0, len(starts), _AVERAGED):
+        rows = slice(first, min(first + _AVERAGED, len(starts)))
+        windows = windows_at(rows)
+        series = np.zeros((num_samples, windows.shape[2])) if series is None else series
+        for start, values in zip(starts[rows], windows, strict=True):
+            series[start : start + window] += fade * values
+            total[start : start + window] += fade
+    return (series / total).astype(np.float32)
+
+
+def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.ndarray:
+    """Cuts windows out of series `(samples, columns)`, float32 of shape `(windows, samples,
+    columns)`; starts as in this module.
+    """
+    usable = [values for values in series if len(values) >= window]
+    which, places = places_in_parts(usable, starts, window)
+    windows = np.empty((len(starts), window, series[0].shape[1]), np.float32)
+    for number in np.unique(which):
+        rows = which == number if len(usable) > 1 else slice(None)
+        view = np.lib.stride_tricks.sliding_window_view(usable[number], window, axis=0)
+        windows[rows] = view[places[rows]].transpose(0, 2, 1)
+    return windows
+
+
+def windows_of(telemetry: "Telemetry", starts: np.ndarray, window: int) -> np.ndarray:
+    """Cuts windows out of the parts of a telemetry, see `cut`."""
+    return cut([part.values for part in telemetry.parts], starts, window)
+
+
+def times_of(telemetry: "Telemetry", starts: np.ndarray, window: int) -> np.ndarray:
+    """Returns the first sample of each window on the clock of the telemetry, integers of shape
+    `(windows,)`.
+    """
+    usable = [part for part in telemetry.parts if len(part) >= window]
+    which, places = places_in_parts(usable, starts, window)
+    return (
+        np.array([round(part.offset_s / telemetry.interval_s) for part in usable])[which] + places
+    )

@@ -1,1 +1,3 @@
-"""The experiment with a coarse and a fine simulator: PyBaMM models of a satellite's battery over low orbits."""
+"""The experiment with a coarse and a fine simulator: PyBaMM models of a satellite's battery over
+low orbits.
+"""

@@ -1,4 +1,6 @@
-"""The enhanced simulator as a source of training data for detectors and as a reference, judged on the fine simulator with noise."""
+"""The enhanced simulator as a source of training data for detectors and as a reference, judged on
+the fine simulator with noise.
+"""
 
 import functools
 from collections.abc import Callable, Mapping
@@ -6,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.candidates import Training, block_edges, split_fold
+from enhsim_tf.scoring import metrics
 from studies.battery.faults import ALL, Fault, columns_of
 from studies.battery.orbits import ORBIT_SAMPLES
 from studies.battery.record import (
@@ -21,17 +23,19 @@ from studies.battery.record import (
 )
 from studies.common.detectors import DETECTORS
 
-COARSE, WITH_RESIDUALS, REAL_15, REAL_120 = (
-    "coarse",
-    "enhanced + residual windows",
-    "real, 15 orbits",
-    "real, 120 orbits",
-)
+COARSE = "coarse"
+WITH_RESIDUALS = "enhanced + residual windows"
+REAL_15 = "real, 15 orbits"
+REAL_120 = "real, 120 orbits"
 SOURCES = (COARSE, WITH_RESIDUALS, REAL_15, REAL_120)
-"""Training data of detectors. The simulator was fitted to 60 orbits; it generates as many orbits as `real, 120 orbits` has. Half of
-the orbits are for training and half for the threshold; of the 15 orbits, two thirds and one third."""
-ENHANCED_RUN, COARSE_RUN = "reference: enhanced run", "reference: coarse run"
-"""The simulator as a reference: the difference between the telemetry and the run of the planned orbits, enhanced or not."""
+"""Training data of detectors. The simulator was fitted to 60 orbits; it generates as many orbits as
+`real, 120 orbits` has. Half of the orbits are for training and half for the threshold; of the 15
+orbits, two thirds and one third."""
+ENHANCED_RUN = "reference: enhanced run"
+COARSE_RUN = "reference: coarse run"
+"""The simulator as a reference: the difference between the telemetry and the run of the planned
+orbits, enhanced or not.
+"""
 QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest", "one-class SVM")
 """Detectors, whose training takes about a second."""
 RATE = 0.01
@@ -54,7 +58,10 @@ class Judge:
     """
 
     def __init__(self, runs: Runs, pairs: PairWindows, candidate: str, seed: int):
-        self.runs, self.pairs, self.candidate, self.seed = runs, pairs, candidate, seed
+        self.runs = runs
+        self.pairs = pairs
+        self.candidate = candidate
+        self.seed = seed
         self.enhance = self._fit(slice(None))
         self.test = {fault: judged_windows(runs, fault, seed).telemetry for fault in (None, *ALL)}
         """Telemetry on which detectors are judged: nominal (None) and under each fault."""
@@ -69,11 +76,13 @@ class Judge:
 
     @functools.cached_property
     def residuals(self) -> np.ndarray:
-        """Telemetry minus enhanced windows, each window enhanced by a fit that has not learnt from its time, shape `(windows, WINDOW)`.
+        """Telemetry minus enhanced windows, each window enhanced by a fit that has not learnt from
+        its time, shape `(windows, WINDOW)`.
 
         Windows that lie across the edge of a block of time are left out.
         """
-        starts, found = self.pairs.starts, []
+        starts = self.pairs.starts
+        found = []
         edges = block_edges(int(starts.min()), int(starts.max()) + WINDOW, WINDOW)
         for fold in range(_NUM_FOLDS):
             learnt, rest = split_fold(starts, WINDOW, edges, fold)
@@ -83,7 +92,8 @@ class Judge:
     def sources(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Training windows and threshold windows of each of `SOURCES`."""
         run = self.runs[run_key("coarse", "coarse")]
-        coarse, num_orbits = coarse_windows(run, 2 * NUM), len(run) // ORBIT_SAMPLES - 1
+        coarse = coarse_windows(run, 2 * NUM)
+        num_orbits = len(run) // ORBIT_SAMPLES - 1
         # whole residual windows, drawn again
         noise = self.residuals[
             np.random.default_rng([self.seed, 1]).integers(0, len(self.residuals), len(coarse))
@@ -115,7 +125,9 @@ class Judge:
         return rows
 
     def reference_rows(self) -> Rows:
-        """Judges the root-mean-square residual of each window. Its threshold comes from the orbits that the simulator is fitted to."""
+        """Judges the root-mean-square residual of each window. Its threshold comes from the orbits
+        that the simulator is fitted to.
+        """
         scores: dict[str, dict[Fault | None, np.ndarray]] = {ENHANCED_RUN: {}, COARSE_RUN: {}}
         for fault, telemetry in self.test.items():
             planned = judged_windows(self.runs, fault, self.seed, is_planned=True).coarse
@@ -135,10 +147,12 @@ class Judge:
 def alarm_rows(
     training: str, detector: str, held_out: np.ndarray, scores: Mapping[Fault | None, np.ndarray]
 ) -> Rows:
-    """Judges a detector at the conformal threshold of `RATE` on scores of held-out nominal windows of its training data.
+    """Judges a detector at the conformal threshold of `RATE` on scores of held-out nominal windows
+    of its training data.
 
     Returns:
-        A row for nominal (None) and for each fault: `alarms` is the share of the fine simulator's windows with an alarm.
+        A row for nominal (None) and for each fault: `alarms` is the share of the fine simulator's
+        windows with an alarm.
     """
     limit = metrics.threshold(held_out, RATE)
     return [
@@ -149,7 +163,9 @@ def alarm_rows(
 
 
 def _apart(windows: np.ndarray, share: float, orbits: int) -> tuple[np.ndarray, np.ndarray]:
-    """Splits windows of so many orbits, in the order of time, and leaves out an orbit between both parts, so that none overlap."""
+    """Splits windows of so many orbits, in the order of time, and leaves out an orbit between both
+    parts, so that none overlap.
+    """
     first = round(share * len(windows))
     return windows[:first], windows[first + -(-len(windows) // orbits) :]
 

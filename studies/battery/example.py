@@ -1,12 +1,14 @@
-"""Writes the small recorded pair that ships with the project: `python -m studies.battery.example examples/battery`.
+"""Writes the small recorded pair that ships with the project: `python -m studies.battery.example
+examples/battery`.
 
 The files need no PyBaMM to be read. Times count seconds.
 
-    telemetry.csv        the fine simulator's voltage through a noisy sensor: what a spacecraft would send
-    simulator.csv        the coarse simulator over the same orbits: voltage, current and temperature
-    simulator_fault.csv  the coarse simulator over other orbits: a nominal orbit, then raised resistance, with its labels
-    telemetry_fault.csv  the telemetry of those orbits
-    simulator_planned.csv  the coarse simulator over those orbits without the fault: what should have happened
+    telemetry.csv        the fine simulator's voltage through a noisy sensor: what a spacecraft
+    would send simulator.csv        the coarse simulator over the same orbits: voltage, current and
+    temperature simulator_fault.csv  the coarse simulator over other orbits: a nominal orbit, then
+    raised resistance, with its labels telemetry_fault.csv  the telemetry of those orbits
+    simulator_planned.csv  the coarse simulator over those orbits without the fault: what should
+    have happened
 """
 
 import sys
@@ -20,7 +22,8 @@ from studies.battery.simulate import COLUMNS, simulate_all
 from studies.common.command import example_command
 
 SEED = 7
-NUM_ORBITS, NUM_FAULT_ORBITS = 32, 4
+NUM_ORBITS = 32
+NUM_FAULT_ORBITS = 4
 FAULT = Fault("raised resistance", 1.0)
 _DIGITS = tuple(zip(COLUMNS, (4, 3, 2), strict=True))
 
@@ -49,12 +52,13 @@ def tables(
         }
         return pd.DataFrame({"time": times} | columns)
 
-    regime, found = REGIMES["gentle"], {}
-    loads, noise = np.random.default_rng([seed, 0]), np.random.default_rng([seed, 1])
+    regime = REGIMES["gentle"]
+    found = {}
+    loads = np.random.default_rng([seed, 0])
+    noise = np.random.default_rng([seed, 1])
     for number, fault, suffix in ((num_orbits, None, ""), (num_fault_orbits, FAULT, "_fault")):
-        load = draw_load(
-            number + 1, regime, loads
-        )  # in the first orbit, which is left out, the battery reaches its usual temperature
+        # in the first orbit, which is left out, the battery reaches its usual temperature
+        load = draw_load(number + 1, regime, loads)
         *planned, runs = simulate_all(
             load, regime, [fault] if fault is None else [None, fault], onset=2 * ORBIT_SAMPLES
         )
@@ -65,10 +69,8 @@ def tables(
             found["simulator_planned"] = in_columns(times, planned[0][0][ORBIT_SAMPLES:])
             is_faulty = times >= ORBIT_SAMPLES * INTERVAL_S
             simulator["scenario"] = np.where(is_faulty, fault.kind, "nominal")
-            simulator["severity"], simulator["mask"] = (
-                np.where(is_faulty, fault.severity, 0.0),
-                is_faulty.astype(int),
-            )
+            simulator["severity"] = np.where(is_faulty, fault.severity, 0.0)
+            simulator["mask"] = is_faulty.astype(int)
         volts = measure(fine[:, 0], SENSOR_NOISE_V, SENSOR_STEP_V, noise)
         telemetry = pd.DataFrame({"time": times, "volts": [f"{value:.4f}" for value in volts]})
         found |= {f"telemetry{suffix}": telemetry, f"simulator{suffix}": simulator}

@@ -1,4 +1,6 @@
-"""Faults of the battery, which both simulators can express, and the sensor that turns a simulated voltage into telemetry."""
+"""Faults of the battery, which both simulators can express, and the sensor that turns a simulated
+voltage into telemetry.
+"""
 
 import numpy as np
 
@@ -12,11 +14,14 @@ SIZES = {
     "drifting sensor": (0.005, 0.01, 0.02, 0.04, 0.08),
     "payload stuck on": (0.2, 0.4, 0.6, 0.8, 1.0),
 }
-"""For each fault its size at each of `common.SEVERITIES`: added resistance in ohms; lost share of the active material of both electrodes;
-lost share of the heat transfer; drift of the voltage sensor in volts an orbit; share of the regime's `stuck_a`."""
-SENSOR_NOISE_V, SENSOR_STEP_V = 0.002, 5.0 / 4096
+"""For each fault its size at each of `common.SEVERITIES`: added resistance in ohms; lost share of
+the active material of both electrodes; lost share of the heat transfer; drift of the voltage sensor
+in volts an orbit; share of the regime's `stuck_a`."""
+SENSOR_NOISE_V = 0.002
+SENSOR_STEP_V = 5.0 / 4096
 """Standard deviation of the voltage sensor's noise, and its resolution: 12 bits over 5 V."""
-SENSOR_NOISE_C, SENSOR_STEP_C = 0.1, 0.0625
+SENSOR_NOISE_C = 0.1
+SENSOR_STEP_C = 0.0625
 """The same of the temperature sensor, in degrees Celsius."""
 
 
@@ -36,7 +41,9 @@ _INPUTS = {
 
 
 def simulator_inputs(fault: Fault | None) -> dict[str, float]:
-    """The three inputs of a simulator by name, all 0 for nominal (None), for a drifting sensor and for a payload that is stuck on."""
+    """The three inputs of a simulator by name, all 0 for nominal (None), for a drifting sensor and
+    for a payload that is stuck on.
+    """
     inputs = dict.fromkeys(_INPUTS.values(), 0.0)
     if fault is not None and fault.kind in _INPUTS:
         inputs[_INPUTS[fault.kind]] = fault.size
@@ -51,7 +58,9 @@ def load_under(load: np.ndarray, fault: Fault | None, regime: Regime, onset: int
 
 
 def drift_under(num_samples: int, fault: Fault | None, onset: int) -> np.ndarray:
-    """Returns the error of a drifting voltage sensor in volts, shape `(num_samples,)`: 0 up to sample `onset`, then a ramp."""
+    """Returns the error of a drifting voltage sensor in volts, shape `(num_samples,)`: 0 up to
+    sample `onset`, then a ramp.
+    """
     if fault is None or fault.kind != "drifting sensor":
         return np.zeros(num_samples)
     return fault.size * np.maximum(np.arange(num_samples) - onset, 0) / ORBIT_SAMPLES
@@ -71,6 +80,8 @@ def measure(
     step: float | np.ndarray,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Measures simulated values of any shape: the sensor adds white noise of `noise_sd` and rounds to multiples of `step`, in float32."""
+    """Measures simulated values of any shape: the sensor adds white noise of `noise_sd` and rounds
+    to multiples of `step`, in float32.
+    """
     noisy = values + noise_sd * rng.standard_normal(np.shape(values))
     return (np.rint(noisy / step) * step).astype(np.float32)

@@ -30,14 +30,17 @@ SHOWN: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
-    """Recall by fault and severity of references and of trained detectors, a regime a row and a fault a column."""
+    """Recall by fault and severity of references and of trained detectors, a regime a row and a
+    fault a column.
+    """
     regimes = found["regimes"]
     kinds = list(next(iter(regimes.values()))["uses"][ENHANCED_RUN]["by_fault"])
     figure, down = new_sheet(
         DOUBLE,
         4.5,
         "The enhanced run finds most faults, trained detectors few",
-        "Share of windows with an alarm, at thresholds that are set for 1 % false alarms. Means over seeds and detectors; severity 1 is the largest.",
+        "Share of windows with an alarm, at thresholds that are set for 1 % false alarms. Means "
+        "over seeds and detectors; severity 1 is the largest.",
     )
     grid = panels(
         figure, down + 0.55, len(regimes), len(kinds), gap=(0.2, 0.12), sharex=True, sharey=True
@@ -73,8 +76,10 @@ FIGURES = {
     "reference_or_source": Figure(
         31,
         "Faults of the battery that are found",
-        "A row of panels for each regime and a column for each fault: the share of windows with an alarm over the severity, with a curve each "
-        "for the enhanced and the coarse run as reference and for detectors trained on enhanced windows and on real orbits.",
+        "A row of panels for each regime and a column for each fault: the share of windows with an "
+        "alarm over the severity, with a curve each "
+        "for the enhanced and the coarse run as reference and for detectors trained on enhanced "
+        "windows and on real orbits.",
         reference_or_source,
     ),
 }

@@ -36,7 +36,9 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
 def tables_of_cell(
     settings: Settings, stages: Stages, regime: str, seed: int, version: str
 ) -> "dict[str, pd.DataFrame]":
-    """Simulates the runs of one seed in one regime with this version of PyBaMM, and judges detectors on them."""
+    """Simulates the runs of one seed in one regime with this version of PyBaMM, and judges
+    detectors on them.
+    """
     import pandas as pd
 
     counts = {part: getattr(settings.battery, f"{part}_orbits") for part in record.PARTS}

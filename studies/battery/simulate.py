@@ -1,8 +1,10 @@
-"""The coarse and the fine simulator of the battery, in PyBaMM (Sulzer et al. 2021), without any report of its use.
+"""The coarse and the fine simulator of the battery, in PyBaMM (Sulzer et al. 2021), without any
+report of its use.
 
-The coarse simulator is a single-particle model (SPM) with the published parameters of Chen et al. (2020), at 25 degrees Celsius. The
-fine one is a Doyle-Fuller-Newman model (DFN) of a vehicle that differs from them. Both have a lumped thermal model. Faults
-are inputs that begin at a given sample, so that one model serves all of them.
+The coarse simulator is a single-particle model (SPM) with the published parameters of Chen et al.
+(2020), at 25 degrees Celsius. The fine one is a Doyle-Fuller-Newman model (DFN) of a vehicle that
+differs from them. Both have a lumped thermal model. Faults are inputs that begin at a given sample,
+so that one model serves all of them.
 """
 
 import dataclasses
@@ -21,7 +23,9 @@ from studies.battery.orbits import FIRST_CHARGE, INTERVAL_S, ORBIT_SAMPLES, Regi
 COLUMNS = ("volts", "amperes", "celsius")
 """Columns of a recorded run."""
 ONSET = ORBIT_SAMPLES
-"""First sample of a fault: runs begin with a nominal orbit, in which the battery also reaches its usual temperature."""
+"""First sample of a fault: runs begin with a nominal orbit, in which the battery also reaches its
+usual temperature.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,7 +37,8 @@ class Model:
         resistance: Contact resistance in ohms.
         lost_material: Lost share of the active material of both electrodes.
         lost_heat_transfer: Lost share of the heat transfer.
-        diffusion: Diffusivity of lithium in the negative electrode's particles, as a share of the published value.
+        diffusion: Diffusivity of lithium in the negative electrode's particles, as a share of the
+            published value.
         follows_ambient: Whether it knows the temperature of the regime.
         is_isothermal: Whether the battery keeps its temperature.
     """
@@ -51,17 +56,18 @@ COARSE = Model()
 VEHICLE = Model("DFN", 0.008, 0.04, 0.4, 0.7, follows_ambient=True)
 MODELS = {"coarse": COARSE, "fine": VEHICLE}
 """The coarse simulator, and the fine one, whose battery differs from the published one."""
-_PUBLISHED_K, _ZERO_K = 298.15, 273.15
+_PUBLISHED_K = 298.15
+_ZERO_K = 273.15
 _ONSET_S = 60.0  # a fault grows to its full size in this time
 _MESH = {"x_n": 10, "x_s": 8, "x_p": 10, "r_n": 12, "r_p": 12}
 _TOLERANCES = {"rtol": 1e-4, "atol": 1e-5}
-_VOLTAGE, _TEMPERATURE = "Terminal voltage [V]", "Volume-averaged cell temperature [K]"
+_VOLTAGE = "Terminal voltage [V]"
+_TEMPERATURE = "Volume-averaged cell temperature [K]"
 _LIMITS_V = (1.0, 5.5)  # wider than the cell's, so that the solver passes over short excursions
 _KINK_A = 0.2  # where the slope of the current changes by more than this, the solver makes a step
-_REDUCTION, _MOST_REDUCTIONS = (
-    0.9,
-    8,
-)  # after a failure of a solver, the current is multiplied by this, at most so often
+# after a failure of a solver, the current is multiplied by this, at most so often
+_REDUCTION = 0.9
+_MOST_REDUCTIONS = 8
 
 
 @functools.cache
@@ -76,7 +82,8 @@ def import_pybamm() -> Any:
         import pybamm
     except ImportError:
         raise InputError(
-            "Expected PyBaMM, which simulates the battery. Received: no such package. Install it: pip install 'enhsim_tf[battery]'."
+            "Expected PyBaMM, which simulates the battery. Received: no such package. Install it: "
+            "pip install 'enhsim_tf[battery]'."
         ) from None
     pybamm.telemetry.disable()  # in case another module imported it first
     pybamm.set_logging_level("ERROR")
@@ -94,18 +101,22 @@ def simulate(
 
     Args:
         model: The model.
-        current: Current in amperes on the clock of `INTERVAL_S`, shape `(samples,)`; positive discharges the battery.
+        current: Current in amperes on the clock of `INTERVAL_S`, shape `(samples,)`; positive
+            discharges the battery.
         regime: How hard the battery is used.
-        faults: The faults, None for nominal. A payload that is stuck on must be in the current already.
+        faults: The faults, None for nominal. A payload that is stuck on must be in the current
+            already.
         onset: First sample of each fault.
 
     Returns:
-        For each fault a float32 run of shape `(samples, 3)` with `COLUMNS`, or None where the solver failed.
+        For each fault a float32 run of shape `(samples, 3)` with `COLUMNS`, or None where the
+        solver failed.
 
     Raises:
         InputError: If PyBaMM is not installed.
     """
-    pybamm, clock = import_pybamm(), np.arange(len(current)) * INTERVAL_S
+    pybamm = import_pybamm()
+    clock = np.arange(len(current)) * INTERVAL_S
     begun = onset * INTERVAL_S
     kinks = clock[np.flatnonzero(np.abs(np.diff(current, 2)) > _KINK_A) + 1]
     stops = np.unique(
@@ -118,11 +129,14 @@ def simulate(
             ]
         )
     )
-    simulation, found = _build(model, current, clock, regime, begun), []
+    simulation = _build(model, current, clock, regime, begun)
+    found = []
     for fault in faults:
         try:
             solution = simulation.solve(stops, t_interp=clock, inputs=simulator_inputs(fault))
-            times, volts, kelvins = solution.t, solution[_VOLTAGE].data, solution[_TEMPERATURE].data
+            times = solution.t
+            volts = solution[_VOLTAGE].data
+            kelvins = solution[_TEMPERATURE].data
         except pybamm.SolverError:
             found.append(None)
             continue
@@ -138,10 +152,13 @@ def simulate(
 def _build(
     model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float
 ) -> Any:
-    """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act from `begun` seconds."""
+    """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act
+    from `begun` seconds.
+    """
     pybamm = import_pybamm()
     published = pybamm.ParameterValues("Chen2020")
-    values, kelvins = published.copy(), regime.ambient_k if model.follows_ambient else _PUBLISHED_K
+    values = published.copy()
+    kelvins = regime.ambient_k if model.follows_ambient else _PUBLISHED_K
     charged = published.copy()
     charged.set_initial_state(FIRST_CHARGE)
     grown = pybamm.Interpolant(
@@ -184,9 +201,11 @@ def simulate_all(
     models: Sequence[Model] = (COARSE, VEHICLE),
     onset: int = ONSET,
 ) -> list[tuple[np.ndarray, ...]]:
-    """Runs simulators over a load, once for each fault, driven by the same current; returns for each fault a run of each.
+    """Runs simulators over a load, once for each fault, driven by the same current; returns for
+    each fault a run of each.
 
-    Where a solver fails, the current of that run is reduced by a tenth and all simulators run again, which is told.
+    Where a solver fails, the current of that run is reduced by a tenth and all simulators run
+    again, which is told.
 
     Args:
         load: Load in amperes, shape `(samples,)`, from the start of an orbit.
@@ -206,10 +225,8 @@ def simulate_all(
             if place not in found:
                 groups.setdefault(current.tobytes(), []).append(place)
         for same in groups.values():
-            current, chosen = (
-                currents[same[0]] * _REDUCTION**number,
-                [faults[place] for place in same],
-            )
+            current = currents[same[0]] * _REDUCTION**number
+            chosen = [faults[place] for place in same]
             runs = zip(
                 *(simulate(model, current, regime, chosen, onset) for model in models), strict=True
             )
@@ -218,11 +235,13 @@ def simulate_all(
                     found[place] = each
                 else:
                     tell(
-                        f"a solver failed; the current is reduced to {_REDUCTION ** (number + 1):.2f} of the load's under {faults[place]}"
+                        "a solver failed; the current is reduced to "
+                        f"{_REDUCTION ** (number + 1):.2f} of the load's under {faults[place]}"
                     )
         if len(found) == len(faults):
             return [found[place] for place in range(len(faults))]
     failed = next(fault for place, fault in enumerate(faults) if place not in found)
     raise InputError(
-        f"Expected loads that the solver can follow. Received: a failure of {failed} at any current. Reduce the load."
+        f"Expected loads that the solver can follow. Received: a failure of {failed} at any "
+        "current. Reduce the load."
     )

@@ -1,4 +1,6 @@
-"""The findings of the study: what the uses of the simulator find, and the target for false alarms that was set before its first run."""
+"""The findings of the study: what the uses of the simulator find, and the target for false alarms
+that was set before its first run.
+"""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -18,9 +20,10 @@ KEPT = KeptTables(
     digits=5,
     command="python -m studies.battery",
 )
-LARGEST_GAP, LEAST_DETECTORS = 0.02, 5
-"""False alarms of detectors trained on enhanced windows with residual windows are within this of those trained on as many real
-orbits, for at least so many detectors."""
+LARGEST_GAP = 0.02
+LEAST_DETECTORS = 5
+"""False alarms of detectors trained on enhanced windows with residual windows are within this of
+those trained on as many real orbits, for at least so many detectors."""
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
@@ -49,7 +52,8 @@ def _use(alarms: "pd.DataFrame") -> dict[str, Any]:
     num_seeds = alarms.groupby("detector")["seed"].transform("nunique")
     alarms = alarms[num_seeds == num_seeds.max()]
     rows = ["detector", "seed"]
-    nominal, faulty = alarms[alarms["fault"] == "nominal"], alarms[alarms["fault"] != "nominal"]
+    nominal = alarms[alarms["fault"] == "nominal"]
+    faulty = alarms[alarms["fault"] != "nominal"]
     by_fault = faulty.groupby(["fault", "severity"], sort=False)["alarms"].mean()
     return {
         "false_alarms": mean_interval(nominal.set_index(rows)["alarms"], rows),

@@ -1,1 +1,3 @@
-"""What the studies share: the command, settings, replicates, tables, intervals, figures, and known noise processes."""
+"""What the studies share: the command, settings, replicates, tables, intervals, figures, and known
+noise processes.
+"""

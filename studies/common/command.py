@@ -1,4 +1,6 @@
-"""The command that all studies share: `python -m studies.NAME`, its options, its folders and its exit code."""
+"""The command that all studies share: `python -m studies.NAME`, its options, its folders and its
+exit code.
+"""
 
 import argparse
 import dataclasses
@@ -21,10 +23,12 @@ class Command:
     """The command of a study.
 
     Args:
-        study: Name of the study, of its folder and of its group of settings, whose `num_seeds` the option `--seeds` changes.
+        study: Name of the study, of its folder and of its group of settings, whose `num_seeds` the
+            option `--seeds` changes.
         description: What the study does, in a sentence.
         options: Further options: for each name what `argparse` takes beside it.
-        run: Runs the study; it takes the options, the settings and the output folder. None: `run` of `studies.STUDY.run`.
+        run: Runs the study; it takes the options, the settings and the output folder. None: `run`
+            of `studies.STUDY.run`.
     """
 
     study: str
@@ -41,17 +45,13 @@ class Command:
 
     def _parse(self, arguments: list[str] | None) -> argparse.Namespace:
         """Reads the command line without slow imports."""
-        parser, own = (
-            Parser(prog=f"python -m studies.{self.study}", description=self.description),
-            PUBLISHED / self.study / "results",
+        parser = Parser(prog=f"python -m studies.{self.study}", description=self.description)
+        own = PUBLISHED / self.study / "results"
+        out_help = (
+            f"output folder (default: results/{self.study}; the published tables are in "
+            f"studies/{self.study}/results)"
         )
-        out_help = f"output folder (default: results/{self.study}; the published tables are in studies/{self.study}/results)"
-        parser.add_argument(
-            "--budget",
-            choices=("smoke", "full"),
-            default="full",
-            help="size of the run (default: full, which takes hours)",
-        )
+        add_budget_and_cache(parser)
         parser.add_argument(
             "--seeds",
             type=int,
@@ -64,12 +64,6 @@ class Command:
         parser.add_argument(
             "--fresh", action="store_true", help="run every stage again instead of using the cache"
         )
-        parser.add_argument(
-            "--cache",
-            type=Path,
-            metavar="DIR",
-            help="folder of cached stages (default: .cache in a checkout)",
-        )
         for name, words in self.options.items():
             parser.add_argument(name, **words)
         options = parser.parse_args(arguments)
@@ -77,7 +71,8 @@ class Command:
             raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
         if options.budget == "smoke" and options.out.resolve() == own:
             raise InputError(
-                f"Expected another folder for a smoke run than that of the published tables. Received: --out {options.out}."
+                "Expected another folder for a smoke run than that of the published tables. "
+                f"Received: --out {options.out}."
             )
         return options
 
@@ -94,6 +89,22 @@ class Command:
         run(options, make_settings(options.budget, **turned), out)
         tell(f"tables, findings.json and figures in {out}/")
         return 0
+
+
+def add_budget_and_cache(parser: argparse.ArgumentParser) -> None:
+    """Adds the options `--budget` and `--cache`, which every study has."""
+    parser.add_argument(
+        "--budget",
+        choices=("smoke", "full"),
+        default="full",
+        help="size of the run (default: full, which takes hours)",
+    )
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="folder of cached stages (default: .cache in a checkout)",
+    )
 
 
 def environment_option(names: Iterable[str]) -> dict[str, dict[str, Any]]:
@@ -117,7 +128,8 @@ def example_command(
     tables: "Callable[[], Mapping[str, pd.DataFrame]]",
     arguments: list[str] | None = None,
 ) -> int:
-    """The command `python -m studies.STUDY.example`, which writes the recorded pair that ships with the project.
+    """The command `python -m studies.STUDY.example`, which writes the recorded pair that ships with
+    the project.
 
     Args:
         study: Name of the study.

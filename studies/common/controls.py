@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from enhsim_tf.detection import registry
-from studies.common.detectors import Detector
+from studies.common.detectors import Detector, LargestStep, MovingDeviation
 
 
 class RandomScore:
@@ -29,6 +28,7 @@ class RandomScore:
 
 CONTROLS: dict[str, Callable[[int], Detector]] = {
     "random score": RandomScore,
-    **{name: registry.DETECTORS[name] for name in ("largest step", "moving deviation")},
+    "largest step": lambda seed: LargestStep(),
+    "moving deviation": lambda seed: MovingDeviation(),
 }
 """Maps each control's name to a factory, which takes a seed."""

@@ -1,6 +1,9 @@
-"""Detectors of the studies, beside those of the tool: neighbours, a forest, a support vector machine, and two autoencoders.
+"""Detectors of the studies: simple scores of windows, neighbours, a forest, a support vector
+machine, and two autoencoders.
 
-Keras is imported only when an autoencoder is trained.
+Windows have the shape `(windows, samples, channels)`; several channels are given in units of their
+standard deviations. Where windows are seen channel by channel, a single channel may do without its
+axis. Keras is imported only when an autoencoder is trained.
 """
 
 from collections.abc import Callable
@@ -10,18 +13,209 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.two_sample import window_features
-from enhsim_tf.detection import registry
-from enhsim_tf.detection.detectors import flat
+
+_WIDTH = 25  # samples of a moving deviation
+_MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` is fitted
 
 
 class Detector(Protocol):
     """An anomaly detector for windows of telemetry. Its threshold is chosen by the caller."""
 
     def fit(self, windows: np.ndarray) -> "Detector":
-        """Learns what is nominal from windows of shape `(windows, samples)`, and returns the detector."""
+        """Learns what is nominal from windows of shape `(windows, samples)`, and returns the
+        detector.
+        """
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns one anomaly score for each window, shape `(windows,)`; higher is more anomalous."""
+        """Returns one anomaly score for each window, shape `(windows,)`; higher is more
+        anomalous.
+        """
+
+
+def flat(windows: np.ndarray) -> np.ndarray:
+    """Windows with the channels one after the other, shape `(windows, channels * samples)`."""
+    return windows.swapaxes(1, -1).reshape(len(windows), -1)
+
+
+class LimitCheck:
+    """Limit check, as it is common in ground stations: the distance by which a window leaves the
+    range of the training samples.
+    """
+
+    def fit(self, windows: np.ndarray) -> "LimitCheck":
+        """Computes the limits, the quantiles of 0.1 % and 99.9 % of nominal samples."""
+        self._limits = np.quantile(windows, [0.001, 0.999], axis=(0, 1))
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the largest distance outside the limits, in the unit of the telemetry; within
+        them, minus the remaining margin.
+        """
+        beyond = np.maximum(
+            self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1]
+        )
+        return beyond.reshape(len(windows), -1).max(axis=1)
+
+
+class PCAResidual:
+    """Residual of a window outside so many principal components of the training windows, also known
+    as Sub-PCA.
+    """
+
+    def __init__(self, num_components: int = 20, seed: int = 0):
+        self.num_components = num_components
+        self.seed = seed
+
+    def fit(self, windows: np.ndarray) -> "PCAResidual":
+        """Computes the principal components of nominal windows."""
+        from sklearn.decomposition import PCA
+
+        windows = flat(windows)
+        # the shares of variance of equal windows are not used
+        with threadpool_limits(1), np.errstate(invalid="ignore"):
+            self._pca = PCA(
+                min(self.num_components, *windows.shape),
+                svd_solver="randomized",
+                random_state=self.seed,
+            ).fit(windows)
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the mean squared residual of each window."""
+        windows = flat(windows)
+        with threadpool_limits(1):
+            return np.mean(
+                (windows - self._pca.inverse_transform(self._pca.transform(windows))) ** 2, axis=1
+            )
+
+
+class JointMeans:
+    """Mahalanobis distance of the means of all channels in so many equal parts of a window.
+
+    A small change of one channel against the others is large where they hardly move apart
+    otherwise; shrinkage of the covariance would hide it.
+    """
+
+    def __init__(self, num_parts: int = 1):
+        self.num_parts = num_parts
+
+    def fit(self, windows: np.ndarray) -> "JointMeans":
+        """Estimates mean and covariance from nominal windows."""
+        means = self._means(windows)
+        self._mean = means.mean(axis=0)
+        self._precision = np.linalg.pinv(np.atleast_2d(np.cov(means, rowvar=False)), hermitian=True)
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the squared distance of each window, divided by the number of means: about 1 for
+        nominal windows.
+        """
+        apart = self._means(windows) - self._mean
+        return np.einsum("wi,ij,wj->w", apart, self._precision, apart) / apart.shape[1]
+
+    def _means(self, windows: np.ndarray) -> np.ndarray:
+        values = np.asarray(windows, np.float64)
+        parts = np.array_split(values, min(self.num_parts, values.shape[1]), axis=1)
+        return np.concatenate([part.mean(axis=1, dtype=np.float64) for part in parts], axis=1)
+
+
+class _Control:
+    """A trivial detector without anything to learn. Anomalies that it finds are trivial to detect
+    (Wu and Keogh 2021).
+    """
+
+    def fit(self, windows: np.ndarray) -> "_Control":
+        """Does nothing."""
+        return self
+
+
+class LargestStep(_Control):
+    """Control: the largest absolute first difference."""
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the largest absolute first difference of each window, in the unit of the
+        telemetry.
+        """
+        return (
+            np.abs(np.diff(windows, axis=1))
+            .reshape(len(windows), windows.shape[1] - 1, -1)
+            .max(axis=(1, 2))
+        )
+
+
+class MovingDeviation(_Control):
+    """Control: the largest standard deviation of 25 neighbouring samples."""
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the largest moving standard deviation of each window, in the unit of the
+        telemetry.
+        """
+        centred = np.asarray(windows, np.float64) - np.mean(
+            windows, axis=1, keepdims=True, dtype=np.float64
+        )
+        centred = centred.reshape(*windows.shape[:2], -1)
+        width = min(_WIDTH, windows.shape[1])
+        sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0), (0, 0))), axis=2)
+        mean, square = (sums[:, :, width:] - sums[:, :, :-width]) / width
+        return np.sqrt(np.maximum(square - mean**2, 0).max(axis=(1, 2)))
+
+
+class Innovation:
+    """Size of what a linear prediction from so many past samples of all channels, less in short
+    windows, does not explain.
+
+    The prediction is a vector autoregression, fitted by ridge regression; errors are weighed by the
+    inverse of their covariance. A channel that loses its relation to the others, or follows them
+    with another delay, is found although its own values look as before.
+    """
+
+    def __init__(self, order: int = 48):
+        self.order = order
+
+    def fit(self, windows: np.ndarray) -> "Innovation":
+        """Fits the prediction and the covariance of its errors to nominal windows."""
+        values = np.asarray(windows, np.float64)
+        self._mean = values.mean(axis=(0, 1))
+        order = max(1, min(self.order, values.shape[1] // 4))
+        number = max(1, _MOST_ROWS // (values.shape[1] - order))
+        centred = (values - self._mean)[
+            np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)
+        ]
+        # (windows, places, channels, order + 1)
+        view = np.lib.stride_tricks.sliding_window_view(centred, order + 1, axis=1)
+        past = view[..., :-1].reshape(-1, centred.shape[2] * order)
+        now = view[..., -1].reshape(-1, centred.shape[2])
+        gram = past.T @ past
+        gram[np.diag_indices_from(gram)] += 1e-3 * np.trace(gram) / len(gram) + 1e-12
+        self._weights = np.linalg.solve(gram, past.T @ now)
+        errors = now - past @ self._weights
+        covariance = errors.T @ errors / len(errors)
+        covariance[np.diag_indices_from(covariance)] += (
+            1e-6 * np.trace(covariance) / len(covariance) + 1e-24
+        )
+        self._whiten = np.linalg.cholesky(np.linalg.inv(covariance))
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the mean square of the weighed errors of each window, about the number of
+        channels for nominal ones.
+        """
+        values = np.asarray(windows, np.float64) - self._mean
+        order = len(self._weights) // values.shape[2]
+        channels = values.shape[2]
+        # input, lag from the oldest, output
+        kernels = self._weights.reshape(channels, order, channels).astype(np.float32)
+        scores = np.empty(len(values))
+        step = max(1, 2_000_000 // (values.shape[1] * channels))
+        for first in range(0, len(values), step):
+            some = values[first : first + step].astype(np.float32)
+            errors = some[:, order:].copy()
+            for lag in range(order):
+                errors -= some[:, lag : lag - order] @ kernels[:, lag]
+            scores[first : first + step] = np.mean(
+                np.sum((errors @ self._whiten.astype(np.float32)) ** 2, axis=2), axis=1
+            )
+        return scores
 
 
 def features(windows: np.ndarray) -> np.ndarray:
@@ -64,20 +258,23 @@ class NearestNeighbours:
         self._index = NearestNeighbors(
             n_neighbors=min(self.num_neighbours, len(windows)), algorithm="brute"
         )
-        self._mean = np.mean(
-            windows, dtype=np.float64
-        )  # subtracted, because a large offset would reduce the precision of the distances
+        # subtracted, because a large offset would reduce the precision of the distances
+        self._mean = np.mean(windows, dtype=np.float64)
         self._index.fit(flat(windows) - self._mean)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the mean distance, in the unit of the telemetry times the square root of the number of samples."""
+        """Returns the mean distance, in the unit of the telemetry times the square root of the
+        number of samples.
+        """
         with threadpool_limits(1):
             return self._index.kneighbors(flat(windows) - self._mean)[0].mean(axis=1)
 
 
 class OneClassSVMOnFeatures:
-    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`."""
+    """One-class support vector machine (Schölkopf 2001) on the standardised features of
+    `window_features`.
+    """
 
     def fit(self, windows: np.ndarray) -> "OneClassSVMOnFeatures":
         """Fits the decision boundary, which leaves at most 1 % of the nominal windows outside."""
@@ -98,20 +295,26 @@ class OneClassSVMOnFeatures:
 
 
 class _Autoencoder:
-    """Scores windows by the mean squared reconstruction error of a network that `_build` makes, trained for so many epochs."""
+    """Scores windows by the mean squared reconstruction error of a network that `_build` makes,
+    trained for so many epochs.
+    """
 
-    default_epochs, learning_rate = 30, 0.001
+    default_epochs = 30
+    learning_rate = 0.001
 
     def __init__(self, epochs: int | None = None, seed: int = 0):
-        self.epochs, self.seed = epochs or self.default_epochs, seed
+        self.epochs = epochs or self.default_epochs
+        self.seed = seed
 
     def fit(self, windows: np.ndarray) -> "_Autoencoder":
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
         from studies.common.training import fit_windows
 
         windows = flat(windows)
-        self._mean, self._scale = np.mean(windows), np.std(windows)
-        self._network, scaled = self._build(windows.shape[1]), self._scaled(windows)
+        self._mean = np.mean(windows)
+        self._scale = np.std(windows)
+        self._network = self._build(windows.shape[1])
+        scaled = self._scaled(windows)
         fit_windows(
             self._network,
             scaled,
@@ -124,7 +327,9 @@ class _Autoencoder:
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
+        """Returns the mean squared reconstruction error of each window, in units of the variance of
+        the training windows.
+        """
         scaled = self._scaled(flat(windows))
         return np.mean((self._reconstruct(scaled) - scaled) ** 2, axis=1)
 
@@ -147,22 +352,23 @@ class DenseAutoencoder(_Autoencoder):
 class ConvolutionalAutoencoder(_Autoencoder):
     """Convolutional autoencoder, which is local and translation-invariant.
 
-    Two convolutions of stride 4 compress every sixteen samples to four numbers, and two transposed convolutions decode them.
+    Two convolutions of stride 4 compress every sixteen samples to four numbers, and two transposed
+    convolutions decode them.
     """
 
-    default_epochs, learning_rate = 15, 0.003
+    default_epochs = 15
+    learning_rate = 0.003
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.backend import keras
         from studies.common.training import seeded_initialiser
 
-        missing = (
-            -samples % 16
-        )  # number of zeros that are appended to a window and removed from the output
-        layers, kernels = (
-            keras.layers,
-            [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)],
-        )
+        # number of zeros that are appended to a window and removed from the output
+        missing = -samples % 16
+        layers = keras.layers
+        kernels = [
+            seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)
+        ]
         options = {"kernel_size": 9, "strides": 4, "padding": "same"}
         return keras.Sequential(
             [
@@ -188,12 +394,14 @@ class ConvolutionalAutoencoder(_Autoencoder):
 
 
 DETECTORS: dict[str, Callable[[int], Any]] = {
-    "limit check": registry.DETECTORS["limit check"],
-    "PCA residual": registry.DETECTORS["PCA residual"],
+    "limit check": lambda seed: LimitCheck(),
+    "PCA residual": lambda seed: PCAResidual(seed=seed),
     "nearest neighbours": lambda seed: NearestNeighbours(),
     "isolation forest": lambda seed: IsolationForestOnFeatures(seed),
     "one-class SVM": lambda seed: OneClassSVMOnFeatures(),
     "dense autoencoder": lambda seed: DenseAutoencoder(seed=seed),
     "convolutional autoencoder": lambda seed: ConvolutionalAutoencoder(seed=seed),
 }
-"""Maps a name to a factory, which takes a seed and returns an unfitted detector; the simplest first, and the networks last."""
+"""Maps a name to a factory, which takes a seed and returns an unfitted detector; the simplest
+first, and the networks last.
+"""

@@ -1,9 +1,11 @@
-"""Evaluation of detectors on real telemetry, as a function of their training data (title and abstract of the paper).
+"""Evaluation of detectors on real telemetry, as a function of their training data (title and
+abstract of the paper).
 
-An arm of the experiment is a kind of training data, for example windows of the enhanced simulator. Each detector is trained on
-one arm, and its threshold is set on held-out windows of the same arm. If the arm and real telemetry were exchangeable, the
-false-alarm rate on real nominal windows would be at most the nominal rate. The excess of the
-false-alarm rate over the nominal rate measures the gap between simulation and reality.
+An arm of the experiment is a kind of training data, for example windows of the enhanced simulator.
+Each detector is trained on one arm, and its threshold is set on held-out windows of the same arm.
+If the arm and real telemetry were exchangeable, the false-alarm rate on real nominal windows would
+be at most the nominal rate. The excess of the false-alarm rate over the nominal rate measures the
+gap between simulation and reality.
 """
 
 import dataclasses
@@ -11,10 +13,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject
-from enhsim_tf.detection.metrics import recall, threshold
+from enhsim_tf.datasets.anomalies import INJECTIONS
+from enhsim_tf.scoring.metrics import recall, threshold
 from enhsim_tf.telemetry.windows import time_blocks
 from studies.common.detectors import Detector
+from studies.common.injections import DURATIONS, SEVERITIES, inject
 from studies.common.metrics import recall_at_real_rate
 
 _NUM_BLOCKS = 10  # consecutive blocks of time for which false alarms are counted separately
@@ -25,9 +28,12 @@ class Trial:
     """Real telemetry on which all arms are evaluated.
 
     Args:
-        nominal: Real nominal windows without overlaps, in the order of time, on which false alarms are counted.
-        reference: Other real nominal windows. Recall at the real rate uses a threshold from their scores.
-        anomalous: Maps a kind and a severity to anomalous windows, which `anomalies.inject` made from real nominal windows.
+        nominal: Real nominal windows without overlaps, in the order of time, on which false alarms
+            are counted.
+        reference: Other real nominal windows. Recall at the real rate uses a threshold from their
+            scores.
+        anomalous: Maps a kind and a severity to anomalous windows, which `injections.inject` made
+            from real nominal windows.
         rate: Nominal false-alarm rate of the thresholds.
     """
 
@@ -45,17 +51,19 @@ def make_trial(
     num_anomalous: int = 150,
     rate: float = 0.01,
 ) -> Trial:
-    """Creates a trial by injecting anomalies of every kind and severity into real nominal telemetry.
+    """Creates a trial by injecting anomalies of every kind and severity into real nominal
+    telemetry.
 
-    The random numbers are independent of the arms. The three durations alternate between windows. All kinds and severities use
-    the same windows and positions.
+    The random numbers are independent of the arms. The three durations alternate between windows.
+    All kinds and severities use the same windows and positions.
 
     Args:
         nominal: Real nominal windows, shape `(windows, samples)`, in the order of time.
         reference: Other real nominal windows.
         noise_sd: Standard deviation of the real noise, which is the unit of severity.
         seed: Seed for the positions.
-        num_anomalous: Number of anomalous windows for each kind and severity, evenly spaced over the nominal windows.
+        num_anomalous: Number of anomalous windows for each kind and severity, evenly spaced over
+            the nominal windows.
         rate: Nominal false-alarm rate of the thresholds.
     """
     chosen = nominal[np.linspace(0, len(nominal) - 1, min(num_anomalous, len(nominal))).astype(int)]
@@ -95,14 +103,15 @@ def evaluate_arm(
         seed: Seed for the detectors.
 
     Returns:
-        The rows of two tables: `alarms` (detector, block, alarms, windows) and `recall` (detector, kind, severity, recall,
-        recall_at_real_rate).
+        The rows of two tables: `alarms` (detector, block, alarms, windows) and `recall` (detector,
+        kind, severity, recall, recall_at_real_rate).
     """
     tables: dict[str, list[dict]] = {"alarms": [], "recall": []}
     for name, make in detectors.items():
         detector = make(seed).fit(training)
         limit = threshold(detector.score(held_out), trial.rate)
-        nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
+        nominal = detector.score(trial.nominal)
+        reference = detector.score(trial.reference)
         for block, scores in enumerate(np.array_split(nominal, _NUM_BLOCKS)):
             tables["alarms"].append(
                 {
@@ -132,7 +141,8 @@ def evaluate_arm(
 def cross_fitted_scores(
     make: Callable[[], Detector], windows: np.ndarray, starts: np.ndarray, num_folds: int
 ) -> np.ndarray:
-    """Scores windows by detectors that were fitted to other blocks of time, which share no sample with them.
+    """Scores windows by detectors that were fitted to other blocks of time, which share no sample
+    with them.
 
     Args:
         make: Returns an unfitted detector.

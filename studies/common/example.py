@@ -1,11 +1,13 @@
-"""The paper's pipeline on its example with other kinds of noise, and its parts as the tool takes them."""
+"""The paper's pipeline on its example with other kinds of noise, and its parts as the tool takes
+them.
+"""
 
 import functools
 from typing import Any
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.paper import settings as of_paper
 from enhsim_tf.paper import telemetry as of_example
@@ -50,7 +52,8 @@ class Example(Pipeline):
 
     def __init__(self, settings: Settings, stages: Stages):
         super().__init__(settings.paper, stages)
-        self.noise, self.coarse = settings.noise, coarse_simulator(settings.paper)
+        self.noise = settings.noise
+        self.coarse = coarse_simulator(settings.paper)
 
     @property
     def telemetry_settings(self) -> dict[str, Any]:
@@ -70,6 +73,6 @@ class Example(Pipeline):
     def train(self) -> Telemetry:
         """The training part, as the tool takes it."""
         part = self.parts["train"]
-        return Telemetry(
+        return Telemetry.of(
             part.values, part.interval, name=part.name, offset_s=part.interval * part.first
         )

@@ -1,13 +1,18 @@
-"""Families of noise whose truth is known, which serve as ground truth for noise models, and which of them a designer may look at.
+"""Families of noise whose truth is known, which serve as ground truth for noise models, and which
+of them a designer may look at.
 
-A function of a family draws float64 noise of mean zero and shape `(number,)`. It takes the number of samples, a random generator, the
-signal that the noise is added to (which only one family needs), and parameters. Standard deviations (`sd`) and amplitudes are in the unit
-of the signal, times in samples. With the values here, all families have a standard deviation of 0.1.
+A function of a family draws float64 noise of mean zero and shape `(number,)`. It takes the number
+of samples, a random generator, the signal that the noise is added to (which only one family needs),
+and parameters. Standard deviations (`sd`) and amplitudes are in the unit of the signal, times in
+samples. With the values here, all families have a standard deviation of 0.1.
 
-The four environments of the study of robustness were known when the convolutional GAN was designed. A generator that is meant
-for noise in general must be judged on noise that its designer did not use. The families are therefore divided before any design
-work: half of them may be looked at during the design, and the other half are reported on once. `LOOKED_AT` contains the four known
-environments and three of the other ten families, drawn by `numpy.random.default_rng(200812082).permutation(...)[:3]`.
+The four environments of the study of robustness were known when the convolutional GAN was designed.
+A generator that is meant for noise in general must be judged on noise that its designer did not
+use. The families are therefore divided before any design
+work: half of them may be looked at during the design, and the other half are reported on once.
+    `LOOKED_AT` contains the four known
+environments and three of the other ten families, drawn by
+`numpy.random.default_rng(200812082).permutation(...)[:3]`.
 """
 
 from collections.abc import Callable
@@ -46,7 +51,9 @@ def autoregressive(
     coefficient: float = 0.7,
     sd: float = 0.1,
 ) -> np.ndarray:
-    """Gaussian AR(1) noise: each sample is `coefficient` times the last one plus an independent draw."""
+    """Gaussian AR(1) noise: each sample is `coefficient` times the last one plus an independent
+    draw.
+    """
     return sd * first_order(number, coefficient, rng)
 
 
@@ -58,7 +65,9 @@ def heteroscedastic(
     sd: float = 0.1,
     correlation: float = 2_000.0,
 ) -> np.ndarray:
-    """Gaussian noise whose logarithm of scale is a slow Gaussian process (Ornstein-Uhlenbeck), with 1 / e left after `correlation`."""
+    """Gaussian noise whose logarithm of scale is a slow Gaussian process (Ornstein-Uhlenbeck), with
+    1 / e left after `correlation`.
+    """
     log_scale = log_scale_sd * first_order(number, np.exp(-1 / correlation), rng)
     # the mean of exp(2 l) is exp(2 sd^2), which the scale takes back
     return sd * np.exp(log_scale - log_scale_sd**2) * rng.standard_normal(number)
@@ -72,7 +81,9 @@ def shot(
     amplitude: float = 0.5,
     background_sd: float = _HALF,
 ) -> np.ndarray:
-    """Poisson pulses of one sample, `rate` a sample, with exponential heights of mean `amplitude`, less their mean, on white noise."""
+    """Poisson pulses of one sample, `rate` a sample, with exponential heights of mean `amplitude`,
+    less their mean, on white noise.
+    """
     places = rng.integers(0, number, rng.poisson(rate * number))
     pulses = np.bincount(places, rng.exponential(amplitude, places.size), minlength=number)
     return pulses - rate * amplitude + rng.normal(0.0, background_sd, number)
@@ -85,7 +96,8 @@ def fractional(
     hurst: float = 0.8,
     sd: float = 0.1,
 ) -> np.ndarray:
-    """The increments of fractional Brownian motion: long memory for a `hurst` exponent above 0.5, white at 0.5.
+    """The increments of fractional Brownian motion: long memory for a `hurst` exponent above 0.5,
+    white at 0.5.
 
     They are drawn exactly, by circulant embedding (Davies and Harte 1987).
     """
@@ -93,19 +105,16 @@ def fractional(
 
     half = next_fast_len(number)
     lag = np.arange(1, half + 1, dtype=np.float64)
-    with np.errstate(
-        divide="ignore"
-    ):  # log(1 - 1) at lag 1 is minus infinity, and its exponential zero
+    # log(1 - 1) at lag 1 is minus infinity, and its exponential zero
+    with np.errstate(divide="ignore"):
         # second differences of lag^(2 hurst) in a form that keeps their digits
         bend = np.expm1(2 * hurst * np.log1p(1 / lag)) + np.expm1(2 * hurst * np.log1p(-1 / lag))
     covariance = np.concatenate([[1.0], 0.5 * lag ** (2 * hurst) * bend])
-    power = np.maximum(
-        rfft(np.concatenate([covariance, covariance[-2:0:-1]])).real, 0
-    )  # below zero by rounding only
+    # below zero by rounding only
+    power = np.maximum(rfft(np.concatenate([covariance, covariance[-2:0:-1]])).real, 0)
     spectrum = rng.standard_normal(half + 1) + 1j * rng.standard_normal(half + 1)
-    spectrum[[0, -1]] = (
-        np.sqrt(2) * spectrum[[0, -1]].real
-    )  # real at frequencies that are their own mirror image
+    # real at frequencies that are their own mirror image
+    spectrum[[0, -1]] = np.sqrt(2) * spectrum[[0, -1]].real
     return sd * irfft(np.sqrt(half * power) * spectrum, 2 * half)[:number]
 
 
@@ -129,18 +138,21 @@ def one_over_f(
     longest: float = 4_000.0,
     sd: float = 0.1,
 ) -> np.ndarray:
-    """Gaussian noise whose power falls with the frequency (flicker noise), and is flat below that of the period `longest`."""
+    """Gaussian noise whose power falls with the frequency (flicker noise), and is flat below that
+    of the period `longest`.
+    """
     from scipy.fft import irfft, next_fast_len, rfftfreq
 
-    # A shaped spectrum is that of a circular series. A series that is longer than needed by twice the longest period keeps
-    # its two ends from being neighbours.
+    # A shaped spectrum is that of a circular series. A series that is longer than needed by twice
+    # the longest period keeps its two ends from being neighbours.
     length = next_fast_len(number + 2 * int(longest), real=True)
     amplitude = np.maximum(rfftfreq(length), 1 / longest) ** -0.5
     amplitude[0] = 0
     spectrum = amplitude * (
         rng.standard_normal(len(amplitude)) + 1j * rng.standard_normal(len(amplitude))
     )
-    # irfft divides by the length and counts each frequency twice: the variance of the series is 4 * sum(a^2) / length^2.
+    # irfft divides by the length and counts each frequency twice: the variance of the series is 4 *
+    # sum(a^2) / length^2.
     return sd / (2 * np.sqrt(np.sum(amplitude**2)) / length) * irfft(spectrum, length)[:number]
 
 
@@ -153,7 +165,9 @@ def interference(number: int, rng: np.random.Generator, signal: Signal = None) -
 def telegraph(
     number: int, rng: np.random.Generator, signal: Signal = None, dwell: float = 300.0
 ) -> np.ndarray:
-    """A level that jumps between two values after random, exponentially distributed times of mean `dwell`, on white noise."""
+    """A level that jumps between two values after random, exponentially distributed times of mean
+    `dwell`, on white noise.
+    """
     changes = rng.random(number) < 1 / dwell
     level = (rng.integers(2) + np.cumsum(changes)) % 2
     return 2 * _HALF * (level - 0.5) + rng.normal(0, _HALF, number)
@@ -162,7 +176,9 @@ def telegraph(
 def quantised(
     number: int, rng: np.random.Generator, signal: Signal = None, step: float = 0.05
 ) -> np.ndarray:
-    """Gaussian AR(1) noise, rounded to multiples of a step, as an analogue-to-digital converter does."""
+    """Gaussian AR(1) noise, rounded to multiples of a step, as an analogue-to-digital converter
+    does.
+    """
     return step * np.rint(0.1 * first_order(number, 0.8, rng) / step)
 
 
@@ -173,7 +189,9 @@ def bursts(
     gap: float = 360.0,
     burst: float = 40.0,
 ) -> np.ndarray:
-    """White noise that is louder during bursts, which begin and end at random (a Markov chain of two states with mean times)."""
+    """White noise that is louder during bursts, which begin and end at random (a Markov chain of
+    two states with mean times).
+    """
     ends = 1 / np.array([gap, burst])
     num_pairs = 10 + int(2 * number / (burst + gap))
     lengths = rng.geometric(np.tile(ends, num_pairs))
@@ -193,10 +211,13 @@ def heavy_tails(
     degrees: float = 3.0,
     sd: float = 0.1,
 ) -> np.ndarray:
-    """AR(1) noise whose innovations have Student's t distribution: large values are not rare, and they ring."""
+    """AR(1) noise whose innovations have Student's t distribution: large values are not rare, and
+    they ring.
+    """
     from scipy.signal import lfilter
 
-    coefficient, settling = 0.5, 200
+    coefficient = 0.5
+    settling = 200
     scale = sd * np.sqrt((1 - coefficient**2) * (degrees - 2) / degrees)
     innovations = scale * rng.standard_t(degrees, number + settling)
     return lfilter([1.0], [1.0, -coefficient], innovations)[settling:]
@@ -234,15 +255,13 @@ GALLERY = {
     "heteroscedastic": NoiseProcess(heteroscedastic),
     "shot": NoiseProcess(shot),
     "fractional": NoiseProcess(fractional),
-    "bernoulli": NoiseProcess(
-        bernoulli, float(np.sqrt(0.01 * (10 * _HALF) ** 2 + _HALF**2))
-    ),  # 0.1 but for its last digit
+    # 0.1 but for its last digit
+    "bernoulli": NoiseProcess(bernoulli, float(np.sqrt(0.01 * (10 * _HALF) ** 2 + _HALF**2))),
     "one_over_f": NoiseProcess(one_over_f),
     "interference": NoiseProcess(interference),
     "telegraph": NoiseProcess(telegraph),
-    "quantised": NoiseProcess(
-        quantised, float(np.sqrt(0.1**2 + 0.05**2 / 12))
-    ),  # by Sheppard's correction
+    # by Sheppard's correction
+    "quantised": NoiseProcess(quantised, float(np.sqrt(0.1**2 + 0.05**2 / 12))),
     "bursts": NoiseProcess(bursts),
     "heavy_tails": NoiseProcess(heavy_tails),
     "loudness": NoiseProcess(loudness),

@@ -13,7 +13,8 @@ class PaperGAN:
     Args:
         noise: Windows of noise, float32 of shape `(windows, settings.window)`.
         settings: The paper's settings.
-        unit: The unit of the noise in the networks, in which its standard deviation should be about 0.1.
+        unit: The unit of the noise in the networks, in which its standard deviation should be about
+            0.1.
         on_record: Called with the iteration at each record.
     """
 
@@ -24,12 +25,17 @@ class PaperGAN:
         unit: float = 1.0,
         on_record: Callable[[int], None] = lambda iteration: None,
     ):
-        from enhsim_tf.paper.noise import NoiseGAN, build_discriminator, build_generator, train_gan
+        from enhsim_tf.paper.noise import build_discriminator, build_generator, connect, train_gan
 
-        self.settings, self.unit = settings, unit
-        gan = NoiseGAN(build_generator(settings), build_discriminator(settings), settings)
-        gan.compile()
-        train_gan(gan, np.asarray(noise / unit, np.float32), 0, settings.iterations, on_record)
+        self.settings = settings
+        self.unit = unit
+        gan = connect(build_generator(settings), build_discriminator(settings), settings)
+        rows = np.asarray(noise / unit, np.float32)
+
+        def draw(number: int, rng: np.random.Generator) -> np.ndarray:
+            return rows[rng.integers(0, len(rows), number)]
+
+        train_gan(gan, draw, 0, settings.iterations, on_record)
         self.generator = gan.generator
 
     def generate(self, number: int, rng: np.random.Generator) -> np.ndarray:

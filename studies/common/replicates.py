@@ -1,4 +1,6 @@
-"""The frame that studies share: replicates in turn, and the tables, findings and figures of all of them."""
+"""The frame that studies share: replicates in turn, and the tables, findings and figures of all of
+them.
+"""
 
 import argparse
 import importlib
@@ -27,19 +29,23 @@ def run_study(
     out: Path,
     about: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Runs a study and writes its tables, and the findings and figures that are computed from the written tables.
+    """Runs a study and writes its tables, and the findings and figures that are computed from the
+    written tables.
 
-    All names with one seed come before the next seed, so that an interrupted run is complete for its first seeds.
+    All names with one seed come before the next seed, so that an interrupted run is complete for
+    its first seeds.
 
     Args:
-        study: Name of the study, of its folder with the modules `summary` and `figure`, and of its group of settings, whose `first_seed`
-            and `num_seeds` say with which seeds.
-        tables_of: Computes the tables of one replicate, for a name, a seed and stages; none if the replicate is left out.
+        study: Name of the study, of its folder with the modules `summary` and `figure`, and of its
+            group of settings, whose `first_seed` and `num_seeds` say with which seeds.
+        tables_of: Computes the tables of one replicate, for a name, a seed and stages; none if the
+            replicate is left out.
         names: What is computed with each seed, for example environments.
         options: The command line, with `cache` and `fresh`.
         settings: All settings.
         out: An existing folder.
-        about: What the findings also hold; versions of packages are joined with those of all studies.
+        about: What the findings also hold; versions of packages are joined with those of all
+            studies.
 
     Returns:
         The findings.
@@ -49,7 +55,10 @@ def run_study(
     summary, figure = (
         importlib.import_module(f"studies.{study}.{name}") for name in ("summary", "figure")
     )
-    group, names, parts, began = getattr(settings, study), tuple(names), {}, time.monotonic()
+    group = getattr(settings, study)
+    names = tuple(names)
+    parts = {}
+    began = time.monotonic()
     replicates = [
         (name, group.first_seed + number) for number in range(group.num_seeds) for name in names
     ]
@@ -59,9 +68,10 @@ def run_study(
         for each, table in tables_of(name, seed, stages).items():
             parts.setdefault(each, []).append(table)
         tell(f"{number} of {len(replicates)} replicates in {time.monotonic() - began:.0f} s")
-        from enhsim_tf.common.backend import keras
+        if "keras" in sys.modules:  # frees the memory of the replicate's networks
+            from enhsim_tf.common.backend import keras
 
-        keras.backend.clear_session()  # frees the memory of the replicate's networks
+            keras.backend.clear_session()
     summary.KEPT.write(
         {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}, out
     )
@@ -76,7 +86,9 @@ def run_study(
 def save_all(
     figures: Mapping[str, Figure], found: Mapping[str, Any], folder: Path, command: str
 ) -> list[Path]:
-    """Draws the figures of a study by name from its findings, with its command as the caption, and returns the files in the folder."""
+    """Draws the figures of a study by name from its findings, with its command as the caption, and
+    returns the files in the folder.
+    """
     is_smoke = found["budget"] == "smoke"
     return [
         path

@@ -25,7 +25,8 @@ class KeptTables:
         command: The command that produces them.
         digits_of: Decimals of tables that differ from `digits`.
         kind: Word for messages.
-        former: Names of tables that the command no longer makes, which are read where they are published.
+        former: Names of tables that the command no longer makes, which are read where they are
+            published.
     """
 
     names: tuple[str, ...]
@@ -37,7 +38,9 @@ class KeptTables:
     former: tuple[str, ...] = ()
 
     def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
-        """Writes tables by name to a folder: labels as dictionaries, and numbers rounded to the precision that their counts support."""
+        """Writes tables by name to a folder: labels as dictionaries, and numbers rounded to the
+        precision that their counts support.
+        """
         for name, table in tables.items():
             compact = table.reset_index(drop=True)
             for column in compact.columns:
@@ -63,7 +66,8 @@ class KeptTables:
         missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
         if missing:
             raise InputError(
-                f"Expected the tables of the {self.kind} in {folder}. Received: no {missing[0]}.parquet. Run {self.command}."
+                f"Expected the tables of the {self.kind} in {folder}. Received: no "
+                f"{missing[0]}.parquet. Run {self.command}."
             )
         there = [
             *self.names,

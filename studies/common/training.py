@@ -14,7 +14,8 @@ def seeded_initialiser(name: str, seed: int) -> keras.initializers.Initializer:
 
 
 def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> keras.Sequential:
-    """Builds an uncompiled stack of Dense layers with relu activations, except for the last layer, which is linear.
+    """Builds an uncompiled stack of Dense layers with relu activations, except for the last layer,
+    which is linear.
 
     Args:
         window: Number of samples in an input window.
@@ -63,9 +64,8 @@ def fit_windows(
     """
     trained = BlockwiseTraining(model) if is_wide_dense_stack(model) else model
     steps = -(-len(inputs) // batch_size)
-    at_once = (
-        1 if callbacks else steps
-    )  # steps between which nobody looks are one call of the graph
+    # steps between which nobody looks are one call of the graph
+    at_once = 1 if callbacks else steps
     trained.compile(
         fused_adam(learning_rate),
         loss="mean_squared_error",
@@ -91,12 +91,14 @@ def _batches(
     inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_size: int
 ) -> tf.data.Dataset:
     """Pairs of batches for all epochs, whose orders have the shape `(epochs, windows)`."""
-    inputs, targets = tf.constant(inputs), tf.constant(targets)
+    inputs = tf.constant(inputs)
+    targets = tf.constant(targets)
     rows = tf.data.Dataset.from_tensor_slices(orders).flat_map(
         lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size)
     )
     options = tf.data.Options()
-    options.autotune.enabled = False  # its thread sleeps for up to a minute, and deleting the data set waits for the thread
+    # its thread sleeps for up to a minute, and deleting the data set waits for the thread
+    options.autotune.enabled = False
     return (
         rows.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows)))
         .prefetch(2)

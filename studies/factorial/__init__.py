@@ -1,1 +1,3 @@
-"""Study: which part of the pipeline (windows, extraction, enhancer or generator) lowers false alarms."""
+"""Study: which part of the pipeline (windows, extraction, enhancer or generator) lowers false
+alarms.
+"""

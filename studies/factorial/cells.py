@@ -1,23 +1,34 @@
 """Design of the study: its factors and its cells, which were fixed before the first run.
 
-A cell is one combination of four factors. Its training data are the signal of its enhancer plus noise of its generator.
+A cell is one combination of four factors. Its training data are the signal of its enhancer plus
+noise of its generator.
 
-- `windows`: the enhancer and the generator learn from as many windows as the paper's pipeline (few) or the residual pipeline (many).
-- `extraction`: the generator learns the telemetry minus its moving average, or minus the signal of the cell's enhancer (residual).
-- `enhancer`: the paper's network, or ridge regression whose penalty is chosen by cross-validation over blocks of time.
-- `generator`: the paper's GAN, a fitted autoregression, or whole windows of the extracted noise drawn again.
+- `windows`: the enhancer and the generator learn from as many windows as the paper's pipeline (few)
+  or the residual pipeline (many).
+- `extraction`: the generator learns the telemetry minus its moving average, or minus the signal of
+  the cell's enhancer (residual).
+- `enhancer`: the paper's network, or ridge regression whose penalty is chosen by cross-validation
+  over blocks of time.
+- `generator`: the paper's GAN, a fitted autoregression, or whole windows of the extracted noise
+  drawn again.
 
-Two deviations from a full design limit its cost. With many windows, the network is trained as in the residual pipeline (2 epochs, falling
-learning rate), because the paper's 40 epochs would take ten times as long. The detectors are the five that train in a second.
+Two deviations from a full design limit its cost. With many windows, the network is trained as in
+the residual pipeline (2 epochs, falling learning rate), because the paper's 40 epochs would take
+ten times as long. The detectors are the five that train in a second.
 """
 
 import dataclasses
 import itertools
 
-FEW, MANY = "few", "many"
-MOVING_AVERAGE, RESIDUAL = "moving average", "residual"
-NETWORK, RIDGE = "network", "ridge"
-PAPER_GAN, AUTOREGRESSION, WHOLE_WINDOWS = "paper's GAN", "autoregression", "whole windows"
+FEW = "few"
+MANY = "many"
+MOVING_AVERAGE = "moving average"
+RESIDUAL = "residual"
+NETWORK = "network"
+RIDGE = "ridge"
+PAPER_GAN = "paper's GAN"
+AUTOREGRESSION = "autoregression"
+WHOLE_WINDOWS = "whole windows"
 LEVELS = {
     "windows": (FEW, MANY),
     "extraction": (MOVING_AVERAGE, RESIDUAL),
@@ -61,7 +72,9 @@ class Cell:
 
     @property
     def source(self) -> tuple[str, str, str]:
-        """What the noise of the cell is learnt from. Noise of the moving average does not depend on the enhancer."""
+        """What the noise of the cell is learnt from. Noise of the moving average does not depend on
+        the enhancer.
+        """
         return (
             self.windows,
             self.extraction,
@@ -76,7 +89,9 @@ WITHOUT_NETWORK = Cell(MANY, RESIDUAL, RIDGE, WHOLE_WINDOWS)
 
 
 def cells_by_source() -> dict[tuple[str, str, str], list[Cell]]:
-    """The cells whose noise is learnt from the same windows, with those of one generator next to each other."""
+    """The cells whose noise is learnt from the same windows, with those of one generator next to
+    each other.
+    """
     ordered = sorted(CELLS.values(), key=lambda cell: (cell.source, cell.generator))
     return {
         source: list(cells)

@@ -1,4 +1,6 @@
-"""The cells of one replicate: the signal of each enhancer, the noise of each generator, and the detectors that are trained on their sum."""
+"""The cells of one replicate: the signal of each enhancer, the noise of each generator, and the
+detectors that are trained on their sum.
+"""
 
 import functools
 from collections.abc import Callable
@@ -35,7 +37,8 @@ if TYPE_CHECKING:
     from studies.common.paper_gan import PaperGAN
 
 Enhance = Callable[[np.ndarray], np.ndarray]
-TRAINING, THRESHOLD = "arms, training", "arms, threshold"
+TRAINING = "arms, training"
+THRESHOLD = "arms, threshold"
 """Purposes of windows: to train a detector, and to set its threshold."""
 
 
@@ -43,22 +46,29 @@ class Pipelines:
     """All cells of one environment and seed. Networks are trained when they are first needed.
 
     Args:
-        replicate: The replicate of the study of robustness that provides the data and the paper's networks.
+        replicate: The replicate of the study of robustness that provides the data and the paper's
+            networks.
     """
 
     def __init__(self, replicate: Replicate):
-        self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
+        self.replicate = replicate
+        self.settings = replicate.settings
+        self.stages = replicate.stages
         self.example = replicate.example
-        self.window, self.seed = self.settings.paper.window, self.settings.seed
+        self.window = self.settings.paper.window
+        self.seed = self.settings.seed
         self.enhancer = functools.cache(self._enhancer)
         self.extracted = functools.lru_cache(maxsize=1)(self._extracted)
         self._model: tuple[tuple[object, ...], object] | None = None
 
     def tables(self) -> "dict[str, pd.DataFrame]":
-        """The table `cells`. The cells whose noise is learnt from the same windows are a stage, so that an interrupted run goes on."""
+        """The table `cells`. The cells whose noise is learnt from the same windows are a stage, so
+        that an interrupted run goes on.
+        """
         import pandas as pd
 
-        _, chosen = self.example.telemetry, self.settings
+        _ = self.example.telemetry
+        chosen = self.settings
         depends = (chosen.paper.of("windows", "enhancer", "noise", "noise GAN"), chosen.second)
         depends += (
             chosen.robustness.num_windows,
@@ -94,7 +104,8 @@ class Pipelines:
         """Trains the detectors on a cell or a reference and judges them on real telemetry.
 
         Returns:
-            A row for each detector: alarms and windows over all blocks of time, and recall as the mean over kinds and severities.
+            A row for each detector: alarms and windows over all blocks of time, and recall as the
+            mean over kinds and severities.
         """
         import pandas as pd
 
@@ -118,7 +129,8 @@ class Pipelines:
 
         Args:
             cell: The cell, or the name of a reference.
-            purpose: `TRAINING` for the windows that train a detector, `THRESHOLD` for those that set its threshold.
+            purpose: `TRAINING` for the windows that train a detector, `THRESHOLD` for those that
+                set its threshold.
         """
         number = self.settings.robustness.num_windows
         if cell == "real":
@@ -139,7 +151,9 @@ class Pipelines:
         ]
 
     def training_starts(self, windows: str) -> np.ndarray:
-        """Start of each training window of the enhancers: those of the paper's network, and those of the residual pipeline."""
+        """Start of each training window of the enhancers: those of the paper's network, and those
+        of the residual pipeline.
+        """
         rng = (
             self.example.draw("training windows")
             if windows == FEW
@@ -148,10 +162,14 @@ class Pipelines:
         return random_window_starts([self.example.train], self.window, self.number(windows), rng)
 
     def pairs(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coarse windows and telemetry of the training part, float32 of shape `(windows, samples)`, that begin at these samples."""
+        """Coarse windows and telemetry of the training part, float32 of shape `(windows, samples)`,
+        that begin at these samples.
+        """
         train = self.example.train
         times = train.offset_s + train.interval_s * (starts[:, None] + np.arange(self.window))
-        return self.example.coarse.simulate(times), cut_windows(train.values, starts, self.window)
+        return self.example.coarse.simulate(times), cut_windows(
+            train.values[:, 0], starts, self.window
+        )
 
     def _enhancer(self, enhancer: str, windows: str) -> Enhance:
         """The function that maps coarse windows to the signal of an enhancer."""
@@ -162,7 +180,9 @@ class Pipelines:
 
     @functools.cached_property
     def second_network(self) -> Enhance:
-        """The network of the residual pipeline, which is trained on more windows in fewer epochs."""
+        """The network of the residual pipeline, which is trained on more windows in fewer
+        epochs.
+        """
         from enhsim_tf.enhancer.model import Enhancer
 
         _ = self.example.telemetry
@@ -193,7 +213,9 @@ class Pipelines:
         np.savez(folder / "enhancer.npz", **arrays)
 
     def _extracted(self, windows: str, extraction: str, enhancer: str) -> np.ndarray:
-        """Windows of the noise that a generator learns, of shape `(windows, samples)`; the arguments are `Cell.source`."""
+        """Windows of the noise that a generator learns, of shape `(windows, samples)`; the
+        arguments are `Cell.source`.
+        """
         number = self.number(windows)
         if extraction == MOVING_AVERAGE:
             return self.example.noise_windows("train", number, "noise windows")
@@ -204,7 +226,9 @@ class Pipelines:
         return target - self.enhancer(enhancer, windows)(coarse)
 
     def generator(self, cell: Cell) -> "WindowBootstrap | GaussianNoise | PaperGAN":
-        """The fitted noise model of a cell. The last one is kept, because both purposes and some cells share it."""
+        """The fitted noise model of a cell. The last one is kept, because both purposes and some
+        cells share it.
+        """
         key = (*cell.source, cell.generator)
         if self._model is None or self._model[0] != key:
             fit = {

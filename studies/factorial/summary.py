@@ -2,13 +2,16 @@
 
 Fixed before the first run:
 
-- The primary outcome is the share of the gap in false alarms that a cell closes: (coarse - cell) / (coarse - real), each the mean
-  false-alarm rate over the detectors. The second outcome is recall at the real rate.
-- Each factor is switched from the paper's level to the other one: few to many windows, moving average to residual, network to ridge
-  regression, and the paper's GAN to each of the other generators in turn. Whole windows are the main comparison.
-- The contribution of a factor is the change that switching it makes, averaged over all orders in which the four factors can be switched
-  (the Shapley value). The contributions add up to the difference between the two ends. Because factors interact, the change is also given
-  for a factor that is switched first (from the paper's pipeline) and last.
+- The primary outcome is the share of the gap in false alarms that a cell closes: (coarse - cell) /
+  (coarse - real), each the mean false-alarm rate over the detectors. The second outcome is recall
+  at the real rate.
+- Each factor is switched from the paper's level to the other one: few to many windows, moving
+  average to residual, network to ridge regression, and the paper's GAN to each of the other
+  generators in turn. Whole windows are the main comparison.
+- The contribution of a factor is the change that switching it makes, averaged over all orders in
+  which the four factors can be switched (the Shapley value). The contributions add up to the
+  difference between the two ends. Because factors interact, the change is also given for a factor
+  that is switched first (from the paper's pipeline) and last.
 """
 
 import itertools
@@ -52,7 +55,9 @@ CONTRASTS = {
     ),
     "few, many": (Cell(FEW, RESIDUAL, RIDGE, WHOLE_WINDOWS).name, WITHOUT_NETWORK.name),
 }
-"""Differences in false alarms and recall that the conclusions use: the first cell minus the second."""
+"""Differences in false alarms and recall that the conclusions use: the first cell minus the
+second.
+"""
 KEPT = KeptTables(
     ("cells",),
     labels=("environment", "cell", "detector"),
@@ -68,7 +73,8 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         tables: As `KEPT.read` gives them.
 
     Returns:
-        Plain JSON types: what was run, the cells, the contributions of the factors and the contrasts.
+        Plain JSON types: what was run, the cells, the contributions of the factors and the
+        contrasts.
     """
     table = tables["cells"]
     values = averaged(table)
@@ -91,17 +97,19 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
 
 
 def averaged(table: "pd.DataFrame") -> "dict[str, pd.DataFrame]":
-    """Means over detectors: the false-alarm rate and both outcomes; replicates in rows and cells in columns."""
+    """Means over detectors: the false-alarm rate and both outcomes; replicates in rows and cells in
+    columns.
+    """
     groups = table.assign(rate=table["alarms"] / table["windows"]).groupby([*REPLICATE, "cell"])
     rate, recall = (groups[name].mean().unstack("cell") for name in ("rate", "recall_at_real_rate"))
-    gap = rate.rsub(rate["coarse"], axis=0).div(
-        rate["coarse"] - rate["real"], axis=0
-    )  # NaN or infinite if there is no gap
+    # NaN or infinite if there is no gap
+    gap = rate.rsub(rate["coarse"], axis=0).div(rate["coarse"] - rate["real"], axis=0)
     return {"false_alarms": rate, "gap_closed": gap, "recall_at_real_rate": recall}
 
 
 def corner(switched: Iterable[str], generator: str) -> str:
-    """Name of the cell in which the given factors have their second level and the others that of the paper.
+    """Name of the cell in which the given factors have their second level and the others that of
+    the paper.
 
     Args:
         switched: Names of factors.
@@ -144,14 +152,16 @@ def shares(values: "pd.DataFrame", generator: str) -> dict[str, Any]:
 
 
 def contribution(worth: Mapping[frozenset[str], Any], factor: str) -> Any:
-    """The Shapley value of a factor: the change that it makes, averaged over all orders of switching the factors.
+    """The Shapley value of a factor: the change that it makes, averaged over all orders of
+    switching the factors.
 
     Args:
         worth: Outcome of each set of switched factors, for all subsets.
         factor: The factor.
     """
     others = sorted(set().union(*worth) - {factor})
-    number, total = len(others) + 1, 0.0
+    number = len(others) + 1
+    total = 0.0
     for size in range(number):
         weight = math.factorial(size) * math.factorial(number - size - 1) / math.factorial(number)
         for before in map(frozenset, itertools.combinations(others, size)):
@@ -160,7 +170,9 @@ def contribution(worth: Mapping[frozenset[str], Any], factor: str) -> Any:
 
 
 def _contrast(values: "Mapping[str, pd.DataFrame]", first: str, second: str) -> dict[str, Any]:
-    """Differences between two cells: crossed intervals over all environments, and Student's intervals over seeds within each."""
+    """Differences between two cells: crossed intervals over all environments, and Student's
+    intervals over seeds within each.
+    """
     differences = {
         name: values[name][first] - values[name][second]
         for name in ("false_alarms", "recall_at_real_rate")

@@ -1,4 +1,6 @@
-"""`python -m studies.few_windows`: how few real windows suffice, and from how few a simulator pays."""
+"""`python -m studies.few_windows`: how few real windows suffice, and from how few a simulator
+pays.
+"""
 
 import argparse
 import sys

@@ -1,4 +1,6 @@
-"""One cell of the study: an environment, a seed and a number of real windows, with all training data."""
+"""One cell of the study: an environment, a seed and a number of real windows, with all training
+data.
+"""
 
 import dataclasses
 import functools
@@ -10,13 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.detection import metrics
-from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
+from enhsim_tf.datasets.anomalies import INJECTIONS
 from enhsim_tf.paper.telemetry import cut_windows, true_signal
+from enhsim_tf.scoring import metrics
 from enhsim_tf.telemetry.series import Telemetry
 from studies.common.detectors import DETECTORS
 from studies.common.evaluation import cross_fitted_scores
 from studies.common.example import coarse_simulator, draw_noise
+from studies.common.injections import DURATIONS, inject
 from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import Settings
 from studies.few_windows.record import (
@@ -32,43 +35,48 @@ from studies.few_windows.record import (
 if TYPE_CHECKING:
     import pandas as pd
 
-QUICK = (
-    "limit check",
-    "PCA residual",
-    "nearest neighbours",
-    "isolation forest",
-)  # detectors whose training takes about a second
+# detectors whose training takes about a second
+QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")
 SEVERITY = 4.0  # of the anomalies, in standard deviations of the noise
-_CORAL_SOURCE = 10  # times as many simulated windows for the covariance of CORAL as for training: they cost nothing
-_FRESH, _THRESHOLD, _CORAL, _ANOMALIES = 81, 82, 83, 84  # numbers of random draws
+# times as many simulated windows for the covariance of CORAL as for training: they cost nothing
+_CORAL_SOURCE = 10
+# numbers of random draws
+_FRESH = 81
+_THRESHOLD = 82
+_CORAL = 83
+_ANOMALIES = 84
 
 
 class World:
-    """The telemetry of one environment and seed: a long record to learn from, and later windows on which everything is judged.
+    """The telemetry of one environment and seed: a long record to learn from, and later windows on
+    which everything is judged.
 
     Args:
         settings: All settings; `noise` is the environment.
     """
 
     def __init__(self, settings: Settings):
-        self.settings, self.window = settings, settings.paper.window
-        counts, chosen = settings.few_windows, settings.paper
+        self.settings = settings
+        self.window = settings.paper.window
+        counts = settings.few_windows
+        chosen = settings.paper
         self.length = max(counts.num_real) * self.window
         number = self.length + (2 * counts.num_judged + 1) * self.window
         clean = true_signal(chosen)(chosen.interval * np.arange(number))
-        rng = np.random.default_rng(
-            [settings.seed, zlib.crc32(b"learning curve")]
-        )  # the draw of the published table
+        # the draw of the published table
+        rng = np.random.default_rng([settings.seed, zlib.crc32(b"learning curve")])
         noise = draw_noise(settings.noise, clean, chosen.noise_sd, rng)
         self.noise_sd = float(np.std(noise))
         self.values = (clean + noise).astype(np.float32)
         self.coarse = coarse_simulator(chosen)
 
     def record(self, num_real: int) -> Record:
-        """The last `num_real` windows before a gap of one window, after which the judged windows begin."""
+        """The last `num_real` windows before a gap of one window, after which the judged windows
+        begin.
+        """
         interval_s = self.settings.paper.interval
         first = self.length - num_real * self.window
-        telemetry = Telemetry(
+        telemetry = Telemetry.of(
             self.values[first : self.length], interval_s, name="record", offset_s=first * interval_s
         )
         return Record(
@@ -81,11 +89,14 @@ class World:
 
     @functools.cached_property
     def judged(self) -> dict[str, np.ndarray]:
-        """Disjoint real windows: `nominal`, `reference` for the matched rate, and `anomalous` with one injected anomaly each."""
+        """Disjoint real windows: `nominal`, `reference` for the matched rate, and `anomalous` with
+        one injected anomaly each.
+        """
         counts = self.settings.few_windows
         starts = self.length + self.window * (1 + np.arange(2 * counts.num_judged))
         windows = cut_windows(self.values, starts, self.window)
-        nominal, reference = windows[: counts.num_judged], windows[counts.num_judged :]
+        nominal = windows[: counts.num_judged]
+        reference = windows[counts.num_judged :]
         parts = []
         for number, kind in enumerate(INJECTIONS):
             chosen = nominal[np.linspace(0, len(nominal) - 1, counts.num_anomalous).astype(int)]
@@ -100,13 +111,14 @@ class World:
         return {"nominal": nominal, "reference": reference, "anomalous": np.concatenate(parts)}
 
     def rows(self, num_real: int, stages: Stages) -> "pd.DataFrame":
-        """The rows of all training data at a number of real windows, which are a stage of their own."""
+        """The rows of all training data at a number of real windows, which are a stage of their
+        own.
+        """
         import pandas as pd
 
         chosen = self.settings
-        same = dataclasses.replace(
-            chosen.few_windows, num_seeds=0, first_seed=0
-        )  # which seeds are computed does not affect a cell
+        # which seeds are computed does not affect a cell
+        same = dataclasses.replace(chosen.few_windows, num_seeds=0, first_seed=0)
         depends = (
             num_real,
             chosen.paper.of("telemetry"),
@@ -127,11 +139,9 @@ class World:
         )
 
     def _rows(self, record: Record) -> list[dict]:
-        number, seed, real = (
-            self.settings.few_windows.num_windows,
-            self.settings.seed,
-            record.windows,
-        )
+        number = self.settings.few_windows.num_windows
+        seed = self.settings.seed
+        real = record.windows
         rows = []
         for name in QUICK:
             make = functools.partial(DETECTORS[name], seed)
@@ -143,7 +153,8 @@ class World:
             ]
             for model in NOISE_MODELS
         }
-        # The map whitens the windows that it is fitted to better than others, so training and threshold use other windows than these.
+        # The map whitens the windows that it is fitted to better than others, so training and
+        # threshold use other windows than these.
         numbers = (_CORAL_SOURCE * number, number, number)
         source, *others = (
             record.generate("gaussian", each, _CORAL + 100 * place)

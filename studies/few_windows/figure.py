@@ -30,13 +30,16 @@ _CURVES = {  # label, marker, line style and colour of each curve that is drawn
 
 def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     """False alarms and recall over the number of real windows, a column for each environment."""
-    environments, numbers = found["environments"], found["numbers"]
+    environments = found["environments"]
+    numbers = found["numbers"]
     figure, down = new_sheet(
         DOUBLE,
         4.6,
         "With at most 20 windows, a simulator pays if its noise fits",
-        "Detectors trained on k real windows, or on a simulator fitted to the same k windows. Mean over four detectors and the seeds. Above: "
-        "nominal windows that are flagged; the line is the target of 1 %; the scale is linear below it. Below: anomalies of 4 standard deviations "
+        "Detectors trained on k real windows, or on a simulator fitted to the same k windows. Mean "
+        "over four detectors and the seeds. Above: "
+        "nominal windows that are flagged; the line is the target of 1 %; the scale is linear "
+        "below it. Below: anomalies of 4 standard deviations "
         "found at 1 % false alarms.",
     )
     grid = panels(
@@ -103,7 +106,8 @@ FIGURES = {
     "learning_curve": Figure(
         18,
         "How few real windows suffice",
-        "False alarms and recall over the number of real windows, a column for each kind of noise and a line for each kind of training data.",
+        "False alarms and recall over the number of real windows, a column for each kind of noise "
+        "and a line for each kind of training data.",
         curves,
     ),
 }

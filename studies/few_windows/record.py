@@ -1,15 +1,19 @@
 """What detectors are trained on, given a record of `k` windows of real telemetry.
 
-Everything that is learnt comes from the record and from the coarse simulator. The record is contiguous, so that it holds `k` disjoint
-windows, and all training data are cut from the same overlapping windows of it, evenly spaced over all samples. What follows was fixed before the first run:
+Everything that is learnt comes from the record and from the coarse simulator. The record is
+contiguous, so that it holds `k` disjoint windows, and all training data are cut from the same
+overlapping windows of it, evenly spaced over all samples. What follows was fixed before the first
+run:
 
-- `real`: detectors are trained on windows of the record. Its own windows set the threshold, each scored by a detector that was trained on
-  the other blocks of time.
-- `simulator + ...`: tuned ridge regression from coarse to real windows, fitted to the record, plus noise of a simple model, fitted
-  to residuals of blocks of time that the regression had not seen. Generated windows train detectors, and others set the threshold.
-- `CORAL`: windows of the simulator with Gaussian noise, whose mean and covariance are aligned with those of the record
-  (Sun, Feng and Saenko 2016). The covariance of the simulator comes from ten times as many further windows. In the first run it came from
-  the windows that train the detectors, which the map whitens better than others; thresholds were too high.
+- `real`: detectors are trained on windows of the record. Its own windows set the threshold, each
+  scored by a detector that was trained on the other blocks of time.
+- `simulator + ...`: tuned ridge regression from coarse to real windows, fitted to the record, plus
+  noise of a simple model, fitted to residuals of blocks of time that the regression had not seen.
+  Generated windows train detectors, and others set the threshold.
+- `CORAL`: windows of the simulator with Gaussian noise, whose mean and covariance are aligned with
+  those of the record (Sun, Feng and Saenko 2016). The covariance of the simulator comes from ten
+  times as many further windows. In the first run it came from the windows that train the detectors,
+  which the map whitens better than others; thresholds were too high.
 """
 
 import functools
@@ -17,21 +21,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
+from enhsim_tf.coarse.square_waves import SquareWaveSimulator
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import evenly_spaced_starts, time_blocks
 from studies.common.gaussian_noise import fit_candidate
 
-REAL, CORAL = "real", "CORAL"
+REAL = "real"
+CORAL = "CORAL"
 SIMULATOR = "simulator + "
 """Beginning of the names of training data with noise of a model; the name of the model follows."""
-NOISE_MODELS = (
-    "gaussian",
-    "autoregression",
-    "residual windows",
-)  # in no environment does the noise follow the signal
+# in no environment does the noise follow the signal
+NOISE_MODELS = ("gaussian", "autoregression", "residual windows")
 NUM_BLOCKS = 5  # of time, for cross-fitting
 _START_RANGE = 1_000_000  # generated windows begin at a random sample below this one
 
@@ -50,15 +52,13 @@ class Record:
     def __init__(
         self, telemetry: Telemetry, coarse: SquareWaveSimulator, window: int, most: int, seed: int
     ):
-        self.telemetry, self.coarse, self.window, self.most, self.seed = (
-            telemetry,
-            coarse,
-            window,
-            most,
-            seed,
-        )
+        self.telemetry = telemetry
+        self.coarse = coarse
+        self.window = window
+        self.most = most
+        self.seed = seed
         self.starts = evenly_spaced_starts([telemetry], window, most)
-        self.windows = cut_windows(telemetry.values, self.starts, window)
+        self.windows = cut_windows(telemetry.values[:, 0], self.starts, window)
 
     def _coarse(self, starts: np.ndarray) -> np.ndarray:
         return self.coarse.simulate(
@@ -73,15 +73,20 @@ class Record:
 
     @functools.cached_property
     def residuals(self) -> tuple[np.ndarray, np.ndarray]:
-        """Noise windows and the enhanced windows below them, from regressions that had not seen the block of time of the window."""
-        coarse, noise = self._coarse(self.starts), np.empty_like(self.windows)
+        """Noise windows and the enhanced windows below them, from regressions that had not seen the
+        block of time of the window.
+        """
+        coarse = self._coarse(self.starts)
+        noise = np.empty_like(self.windows)
         for training, held_out in time_blocks(self.starts, NUM_BLOCKS, self.window):
             fitted = fit_ridge(coarse[training], self.windows[training], self.starts[training])
             noise[held_out] = self.windows[held_out] - fitted.predict(coarse[held_out])
         return noise, self.windows - noise
 
     def generate(self, name: str, num_windows: int, purpose: int) -> np.ndarray:
-        """Generates windows of the simulator with noise of one of `NOISE_MODELS`; `purpose` is the number of the random draw."""
+        """Generates windows of the simulator with noise of one of `NOISE_MODELS`; `purpose` is the
+        number of the random draw.
+        """
         rng = np.random.default_rng([self.seed, purpose])
         clean = self.enhance(self._coarse(rng.integers(0, _START_RANGE, num_windows)))
         model = fit_candidate(name, *(each[:, :, None] for each in self.residuals))
@@ -89,10 +94,11 @@ class Record:
 
 
 def coral_alignment(source: np.ndarray, target: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Correlation alignment: a linear map that gives source windows the mean and covariance of target windows, `(windows, samples)`.
+    """Correlation alignment: a linear map that gives source windows the mean and covariance of
+    target windows, `(windows, samples)`.
 
-    Covariances are shrunk towards their mean variance, because a short record does not determine them. The map whitens the source and
-    colours it as the target; it returns float32.
+    Covariances are shrunk towards their mean variance, because a short record does not determine
+    them. The map whitens the source and colours it as the target; it returns float32.
     """
     transfer = _power(_covariance(source), -0.5) @ _power(_covariance(target), 0.5)
     return lambda windows: (

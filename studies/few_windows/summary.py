@@ -1,8 +1,9 @@
-"""What the table of the study says: from how few real windows a simulator pays, and from how many real windows suffice.
+"""What the table of the study says: from how few real windows a simulator pays, and from how many
+real windows suffice.
 
-The rules below were fixed before the first run. False-alarm rates and recalls are means over the detectors of a kind of training data; excess is the
-false-alarm rate above the one that thresholds were set for. Recall is compared at the matched rate, with a threshold from other real
-windows.
+The rules below were fixed before the first run. False-alarm rates and recalls are means over the
+detectors of a kind of training data; excess is the false-alarm rate above the one that thresholds
+were set for. Recall is compared at the matched rate, with a threshold from other real windows.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,9 @@ KEPT = KeptTables(
     command="python -m studies.few_windows",
 )
 RATE = 0.01
-PAYS_SHARE = 0.5  # a simulator pays where its excess is at most this share of that of training on the real windows alone
+# a simulator pays where its excess is at most this share of that of training on the real windows
+# alone
+PAYS_SHARE = 0.5
 MAX_RECALL_LOSS = 0.03  # and its recall at the matched rate is at most this much lower
 SUFFICES = 0.005  # real windows suffice where the excess of training on them is at most this
 
@@ -33,13 +36,13 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         tables: The table `rows`.
 
     Returns:
-        For each environment the curves of all training data (`arms`) over the number of real windows, the numbers at which each simulator
-        `pays`, and those at which other methods do, compared with the real windows of the same seeds; and the smallest number from which
-        the real windows suffice.
+        For each environment the curves of all training data (`arms`) over the number of real
+        windows, the numbers at which each simulator `pays`, and those at which other methods do,
+        compared with the real windows of the same seeds; and the smallest number from which the
+        real windows suffice.
     """
-    rows = tables["rows"].astype(
-        {"recall": float, "recall_at_real_rate": float}
-    )  # tables hold float32
+    # tables hold float32
+    rows = tables["rows"].astype({"recall": float, "recall_at_real_rate": float})
     rows["rate"] = rows["alarms"] / rows["windows"]
     numbers = sorted({int(number) for number in rows["num_real"]})
     environments = {}
@@ -70,7 +73,9 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
 
 
 def _curve(rows: "pd.DataFrame", numbers: Sequence[int]) -> dict[str, dict[str, float]]:
-    """Means over seeds of the false-alarm rate, its excess and both recalls, by the number of real windows."""
+    """Means over seeds of the false-alarm rate, its excess and both recalls, by the number of real
+    windows.
+    """
     by_seed = rows.groupby(["num_real", "seed"])[["rate", "recall", "recall_at_real_rate"]].mean()
     means = by_seed.groupby("num_real").mean().assign(excess=lambda table: table["rate"] - RATE)
     return {
@@ -80,10 +85,13 @@ def _curve(rows: "pd.DataFrame", numbers: Sequence[int]) -> dict[str, dict[str, 
 
 
 def _pays(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> list[int]:
-    """The numbers of real windows at which training data pay, compared with the real windows of the same seeds."""
+    """The numbers of real windows at which training data pay, compared with the real windows of the
+    same seeds.
+    """
     own = rows[rows["arm"] == arm]
     real = _curve(rows[(rows["arm"] == REAL) & rows["seed"].isin(own["seed"].unique())], numbers)
-    its, found = _curve(own, numbers), []
+    its = _curve(own, numbers)
+    found = []
     for number in numbers:
         at = str(number)
         if at in its["excess"] and real["excess"][at] > SUFFICES:

@@ -1,7 +1,8 @@
 """One cell of the study: a family of noise and a seed, with every noise model.
 
-The noise models learn the true noise, so that errors of the enhancer have no effect. Detectors are trained on the true waves with
-generated noise and judged on nominal windows with real noise, as in the study of robustness.
+The noise models learn the true noise, so that errors of the enhancer have no effect. Detectors are
+trained on the true waves with generated noise and judged on nominal windows with real noise, as in
+the study of robustness.
 """
 
 import functools
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 LEARNT = "mixture density network"
 MODELS = (*CANDIDATES, LEARNT)
 """The noise models that are tried, the simplest first."""
-_NUM_DRAWS = 3  # of as many generated windows as there are real ones: measures of realism are means over them
+# of as many generated windows as there are real ones: measures of realism are means over them
+_NUM_DRAWS = 3
 # numbers of random draws, and the names of draws below, are those of the published tables
 _STREAMS = {
     "none": 0,
@@ -49,15 +51,19 @@ class Cell:
     """
 
     def __init__(self, settings: Settings, stages: Stages):
-        self.settings, self.stages = settings, stages
+        self.settings = settings
+        self.stages = stages
         self.one = Replicate(settings, stages)
         self.example = self.one.example
 
     def tables(self) -> "dict[str, pd.DataFrame]":
-        """The tables of real windows and of all models; each is a stage of its own, so that an interrupted run goes on."""
+        """The tables of real windows and of all models; each is a stage of its own, so that an
+        interrupted run goes on.
+        """
         import pandas as pd
 
-        _, chosen = self.example.telemetry, self.settings
+        _ = self.example.telemetry
+        chosen = self.settings
         counts = (
             chosen.robustness.num_windows,
             chosen.robustness.num_anomalous,
@@ -100,8 +106,11 @@ class Cell:
             table.to_parquet(folder / f"{name}.parquet")
 
     def _generated(self, name: str, number: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Windows that train detectors and set their thresholds, and draws of noise for the measures of realism."""
-        model, seed = self._fit(name), self.settings.seed
+        """Windows that train detectors and set their thresholds, and draws of noise for the
+        measures of realism.
+        """
+        model = self._fit(name)
+        seed = self.settings.seed
         rng = np.random.default_rng([seed, _STREAMS[name], _DRAW])
         purposes = ("ladder, training", "ladder, threshold")
         waves = [
@@ -112,7 +121,8 @@ class Cell:
             clean + model.generate(len(clean), rng, clean[:, :, None])[:, :, 0] for clean in waves
         ]
         more = self.example.windows("calibration", number, "ladder, realism")["truth"]
-        # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
+        # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise
+        # of real telemetry has
         compared = [
             more + model.generate(number, rng, more[:, :, None])[:, :, 0] - more
             for _ in range(_NUM_DRAWS)
@@ -127,7 +137,9 @@ class Cell:
         return _OneChannel(learner.fit(noise[:, :, 0], clean[:, :, 0], starts))
 
     def _floor(self) -> tuple[RealFloor, np.ndarray]:
-        """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample."""
+        """The real-vs-real baseline of two samples of true noise, and held-out windows of a third
+        sample.
+        """
         every = (self.example.windows(part, None) for part in ("test", "train", "calibration"))
         samples = [windows["target"] - windows["truth"] for windows in every]
         number = min(self.settings.robustness.num_windows, *map(len, samples))
@@ -137,7 +149,9 @@ class Cell:
         ), held_out
 
     def _detected(self, arms: list[np.ndarray]) -> list[dict]:
-        """False alarms and recall of every detector, trained on the first windows, with the threshold of the second ones."""
+        """False alarms and recall of every detector, trained on the first windows, with the
+        threshold of the second ones.
+        """
         trial = self.one.trial(self.settings.noise_models.num_anomalous)
         judged = evaluation.evaluate_arm(*arms, trial, DETECTORS, self.settings.seed)
         rows = []
@@ -156,7 +170,9 @@ class Cell:
 
     @functools.cached_property
     def _learnt(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Windows of noise of the training part, from which the models learn, the signal below them, and their first samples."""
+        """Windows of noise of the training part, from which the models learn, the signal below
+        them, and their first samples.
+        """
         windows = self.example.windows(
             "train", self.settings.noise_models.num_windows, "ladder, learnt"
         )

@@ -1,7 +1,8 @@
-"""Further distances between generated and real windows, with which `real_floor` judges noise (evaluates section 2.3 of the paper).
+"""Further distances between generated and real windows, with which `real_floor` judges noise
+(evaluates section 2.3 of the paper).
 
-Distances of spectra and correlations take the results of `window_spectra` or `lagged_products`, so that each window is transformed only
-once when the same windows are resampled many times.
+Distances of spectra and correlations take the results of `window_spectra` or `lagged_products`, so
+that each window is transformed only once when the same windows are resampled many times.
 """
 
 import functools
@@ -11,23 +12,26 @@ import numpy as np
 from enhsim_tf.common.measures import lagged_products
 
 _TINY = 1e-30  # keeps logarithms and quotients of constant windows finite
-_TIME_HALF_BANDWIDTH, _NUM_TAPERS = (
-    4,
-    7,
-)  # samples times half the bandwidth in cycles a sample; Slepian tapers that are averaged
+# samples times half the bandwidth in cycles a sample; Slepian tapers that are averaged
+_TIME_HALF_BANDWIDTH = 4
+_NUM_TAPERS = 7
 _NUM_KERNELS = 16  # of each of the dilations 1, 2, 4, ...
 _NUM_NEIGHBOURS = 5  # rank of the neighbour that defines the radius of a neighbourhood
 
 
 def lagged_square_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
-    """`lagged_products` of the squared deviations from the mean, which show volatility clustering."""
+    """`lagged_products` of the squared deviations from the mean, which show volatility
+    clustering.
+    """
     return lagged_products(
         (np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)) ** 2, max_lag
     )
 
 
 def autocorrelation_distance(generated_products: np.ndarray, real_products: np.ndarray) -> float:
-    """Largest absolute difference of two autocorrelations, which are computed from two sets of `lagged_products`."""
+    """Largest absolute difference of two autocorrelations, which are computed from two sets of
+    `lagged_products`.
+    """
     generated, real = (
         np.mean(products, axis=0) for products in (generated_products, real_products)
     )
@@ -40,41 +44,51 @@ def log_scales(windows: np.ndarray) -> np.ndarray:
 
 
 def log_scale_distance(generated_scales: np.ndarray, real_scales: np.ndarray) -> float:
-    """First Wasserstein distance between two sets of `log_scales`, which compares how the scale varies between windows."""
+    """First Wasserstein distance between two sets of `log_scales`, which compares how the scale
+    varies between windows.
+    """
     from scipy.stats import wasserstein_distance
 
     return float(wasserstein_distance(generated_scales, real_scales))
 
 
 def kurtosis_difference(generated: np.ndarray, real: np.ndarray) -> float:
-    """Excess kurtosis of the generated values minus that of the real values. A positive difference means too heavy tails."""
+    """Excess kurtosis of the generated values minus that of the real values. A positive difference
+    means too heavy tails.
+    """
     return _excess_kurtosis(generated) - _excess_kurtosis(real)
 
 
 def _excess_kurtosis(windows: np.ndarray) -> float:
-    """The standardised fourth moment of the values minus 3, which is 0 for a Gaussian distribution."""
+    """The standardised fourth moment of the values minus 3, which is 0 for a Gaussian
+    distribution.
+    """
     centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
     squares = centred**2
     return float(np.mean(squares**2) / (np.mean(squares) ** 2 + _TINY) - 3)
 
 
 def tail_ratio(generated: np.ndarray, real: np.ndarray) -> float:
-    """Ratio of the 0.999 quantiles of the absolute values, generated to real. A ratio above 1 means too heavy tails."""
+    """Ratio of the 0.999 quantiles of the absolute values, generated to real. A ratio above 1 means
+    too heavy tails.
+    """
     return float(np.quantile(np.abs(generated), 0.999) / (np.quantile(np.abs(real), 0.999) + _TINY))
 
 
 def window_spectra(windows: np.ndarray) -> np.ndarray:
-    """Multitaper power spectrum of each window (Thomson 1982), without the zero frequency and the Nyquist frequency.
+    """Multitaper power spectrum of each window (Thomson 1982), without the zero frequency and the
+    Nyquist frequency.
 
     Args:
         windows: Windows of shape `(windows, samples)`.
 
     Returns:
-        float64 array of shape `(windows, (samples - 1) // 2)`, in squared units for each bin. The expected spectrum of white
-        noise equals its variance in every bin.
+        float64 array of shape `(windows, (samples - 1) // 2)`, in squared units for each bin. The
+        expected spectrum of white noise equals its variance in every bin.
     """
     values = np.asarray(windows, np.float64)
-    samples, power = values.shape[1], 0.0
+    samples = values.shape[1]
+    power = 0.0
     for taper in _slepian_tapers(samples):
         power = power + np.abs(np.fft.rfft(values * taper, axis=1)[:, 1 : (samples + 1) // 2]) ** 2
     return power / _NUM_TAPERS
@@ -88,16 +102,19 @@ def _slepian_tapers(samples: int) -> np.ndarray:
 
 
 def geodesic_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
-    """Geodesic distance of two power spectra (Georgiou 2007), which compares their shapes independently of scale.
+    """Geodesic distance of two power spectra (Georgiou 2007), which compares their shapes
+    independently of scale.
 
-    It is the standard deviation, over the bins, of the log ratio of the median `window_spectra`. Wunderlich and Sklar (2023)
-    evaluate generated noise with this distance.
+    It is the standard deviation, over the bins, of the log ratio of the median `window_spectra`.
+    Wunderlich and Sklar (2023) evaluate generated noise with this distance.
     """
     return float(np.std(_log_ratio(generated_spectra, real_spectra)))
 
 
 def log_spectral_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
-    """Root mean square, over the bins, of the log ratio of the median `window_spectra`, which compares shape and scale."""
+    """Root mean square, over the bins, of the log ratio of the median `window_spectra`, which
+    compares shape and scale.
+    """
     return float(np.sqrt(np.mean(_log_ratio(generated_spectra, real_spectra) ** 2)))
 
 
@@ -108,25 +125,29 @@ def _log_ratio(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> np.nd
 
 
 def convolution_features(windows: np.ndarray) -> np.ndarray:
-    """Features of each window by fixed random convolutions (ROCKET, Dempster et al. 2020), for a linear classifier.
+    """Features of each window by fixed random convolutions (ROCKET, Dempster et al. 2020), for a
+    linear classifier.
 
-    The kernels have nine taps and all dilations that fit into a window. For each kernel, the features are the largest response
-    and the share of responses above a random threshold. Together with a linear classifier, this is a small convolutional
-    network that needs no training of its convolutions, and therefore no TensorFlow.
+    The kernels have nine taps and all dilations that fit into a window. For each kernel, the
+    features are the largest response and the share of responses above a random threshold. Together
+    with a linear classifier, this is a small convolutional network that needs no training of its
+    convolutions, and therefore no TensorFlow.
 
     Args:
-        windows: Windows of shape `(windows, samples)`, standardised by the mean and the standard deviation of real windows.
+        windows: Windows of shape `(windows, samples)`, standardised by the mean and the standard
+            deviation of real windows.
 
     Returns:
         float32 array of shape `(windows, dilations * 2 * _NUM_KERNELS)`.
     """
-    rng, values, taps = np.random.default_rng(0), np.asarray(windows, np.float32), 9
+    rng = np.random.default_rng(0)
+    values = np.asarray(windows, np.float32)
+    taps = 9
     found = []
     for dilation in 2 ** np.arange(int(np.log2((values.shape[1] - 1) / (taps - 1))) + 1):
         kernels = rng.standard_normal((taps, _NUM_KERNELS)).astype(np.float32)
-        kernels /= np.linalg.norm(
-            kernels, axis=0
-        )  # the responses to white noise of standard deviation 1 have standard deviation 1
+        # the responses to white noise of standard deviation 1 have standard deviation 1
+        kernels /= np.linalg.norm(kernels, axis=0)
         thresholds = rng.standard_normal(_NUM_KERNELS).astype(np.float32)
         pooled = []
         for begin in range(0, len(values), 64):  # 64 windows fit into the processor's cache
@@ -148,10 +169,12 @@ def convolution_features(windows: np.ndarray) -> np.ndarray:
 
 
 def density(generated_features: np.ndarray, real_features: np.ndarray) -> float:
-    """Mean number of real neighbourhoods that contain a generated window, divided by the rank of the neighbour (Naeem et al. 2020).
+    """Mean number of real neighbourhoods that contain a generated window, divided by the rank of
+    the neighbour (Naeem et al. 2020).
 
-    The neighbourhood of a real window is the ball that extends to its fifth nearest real window, in features standardised by the
-    real windows. The density of perfect noise is 1. Copies of a few typical windows have a density above 1.
+    The neighbourhood of a real window is the ball that extends to its fifth nearest real window, in
+    features standardised by the real windows. The density of perfect noise is 1. Copies of a few
+    typical windows have a density above 1.
 
     Args:
         generated_features: Features of generated windows, shape `(windows, features)`.
@@ -164,10 +187,11 @@ def density(generated_features: np.ndarray, real_features: np.ndarray) -> float:
 
 
 def coverage(generated_features: np.ndarray, real_features: np.ndarray) -> float:
-    """Share of real neighbourhoods (see `density`) that contain at least one generated window (Naeem et al. 2020).
+    """Share of real neighbourhoods (see `density`) that contain at least one generated window
+    (Naeem et al. 2020).
 
-    The expected coverage of perfect noise, with equal numbers of windows, is `1 - 2 ** -5`. A generator that repeats itself has a
-    lower coverage.
+    The expected coverage of perfect noise, with equal numbers of windows, is `1 - 2 ** -5`. A
+    generator that repeats itself has a lower coverage.
     """
     return float(_inside(generated_features, real_features).any(axis=0).mean())
 
@@ -179,34 +203,36 @@ def _inside(generated_features: np.ndarray, real_features: np.ndarray) -> np.nda
     generated, real = (
         _standardised(features, real_features) for features in (generated_features, real_features)
     )
+    # index 0 is the window itself
     reach = np.partition(cdist(real, real, "sqeuclidean"), _NUM_NEIGHBOURS, axis=1)[
         :, _NUM_NEIGHBOURS
-    ]  # index 0 is the window itself
+    ]
     return cdist(generated, real, "sqeuclidean") <= reach
 
 
 def mmd_squared(generated_features: np.ndarray, real_features: np.ndarray) -> float:
     """Unbiased estimate of the squared maximum mean discrepancy (MMD, Gretton et al. 2012).
 
-    The estimate has a mean of 0 for two samples of the same distribution, and can be negative. Features are standardised by
-    the real windows. The kernel is exp(-d^2 / (2 m^2)), where m is the median distance between real windows.
+    The estimate has a mean of 0 for two samples of the same distribution, and can be negative.
+    Features are standardised by the real windows. The kernel is exp(-d^2 / (2 m^2)), where m is the
+    median distance between real windows.
     """
     from scipy.spatial.distance import pdist, squareform
 
     generated, real = (
         _standardised(features, real_features) for features in (generated_features, real_features)
     )
-    bandwidth, number, other = (
-        max(np.median(pdist(real, "sqeuclidean")), 1e-12),
-        len(generated),
-        len(real),
-    )
+    bandwidth = max(np.median(pdist(real, "sqeuclidean")), 1e-12)
+    number = len(generated)
+    other = len(real)
+    # with zeros on the diagonal
     kernel = squareform(
         np.exp(pdist(np.concatenate([generated, real]), "sqeuclidean") / (-2 * bandwidth))
-    )  # with zeros on the diagonal
+    )
     is_generated = np.repeat([1.0, 0.0], [number, other])[:, None]
     to_generated = kernel @ is_generated
-    both, cross = np.sum(is_generated * to_generated), np.sum((1 - is_generated) * to_generated)
+    both = np.sum(is_generated * to_generated)
+    cross = np.sum((1 - is_generated) * to_generated)
     rest = kernel.sum() - both - 2 * cross
     return float(
         both / (number * (number - 1)) + rest / (other * (other - 1)) - 2 * cross / (number * other)

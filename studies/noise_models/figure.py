@@ -33,7 +33,8 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         DOUBLE,
         max(2.6, 1.5 + 0.22 * len(families)),
         "Matched residual windows keep false alarms near 1 % on all families",
-        "Detectors trained with noise of each model, judged on real windows; means of seven. Lines: the target of 1 % and the tolerance of 3 points. "
+        "Detectors trained with noise of each model, judged on real windows; means of seven. "
+        "Lines: the target of 1 % and the tolerance of 3 points. "
         "Above the dots: families that the design of the network looked at.",
     )
     left, right = panels(figure, down + 0.3, 1, 2, gap=(0.05, 0.1))[0]
@@ -87,7 +88,8 @@ FIGURES = {
     "false_alarms": Figure(
         17,
         "Noise models on fourteen families of noise",
-        "A row for each family of noise with a mark for each noise model: the false alarms on nominal windows of detectors trained with its "
+        "A row for each family of noise with a mark for each noise model: the false alarms on "
+        "nominal windows of detectors trained with its "
         "noise, and the recall that they lose.",
         false_alarms,
     ),

@@ -1,9 +1,11 @@
-"""Real-vs-real baselines ("floors") of all realism measures, to which generated noise is compared (evaluates section 2.3 of the paper).
+"""Real-vs-real baselines ("floors") of all realism measures, to which generated noise is compared
+(evaluates section 2.3 of the paper).
 
-The value of a measure cannot be interpreted alone, because two finite samples of the same process differ too, by an amount
-that depends on the process. The floor of a measure is the distribution of its values for real windows compared with other
-real windows. To estimate it, real windows are repeatedly split at random into two halves, by blocks in time, and one half is
-treated as if it were generated.
+The value of a measure cannot be interpreted alone, because two finite samples of the same process
+differ too, by an amount that depends on the process. The floor of a measure is the distribution of
+its values for real windows compared with other real windows. To estimate it, real windows are
+repeatedly split at random into two halves, by blocks in time, and one half is treated as if it were
+generated.
 """
 
 import functools
@@ -22,12 +24,15 @@ from enhsim_tf.common import two_sample
 from enhsim_tf.common.two_sample import window_features
 from studies.noise_models import distances
 
-_DECIMALS = 4  # in standard deviations of the noise; smaller differences are rounding errors of 32-bit telemetry
+# in standard deviations of the noise; smaller differences are rounding errors of 32-bit telemetry
+_DECIMALS = 4
 _BLOCK = 10  # consecutive windows that stay together when the windows are split
 
 
 def linear_classifier(generated_features: np.ndarray, real_features: np.ndarray) -> float:
-    """AUC as that of `two_sample.boosted_trees`, of a ridge classifier on standardised features, intended for many features."""
+    """AUC as that of `two_sample.boosted_trees`, of a ridge classifier on standardised features,
+    intended for many features.
+    """
     classifier = make_pipeline(StandardScaler(), RidgeClassifier(alpha=100.0))
     return two_sample.held_out_auc(
         classifier, "decision_function", generated_features, real_features
@@ -36,15 +41,18 @@ def linear_classifier(generated_features: np.ndarray, real_features: np.ndarray)
 
 @dataclass(frozen=True)
 class Measure:
-    """A realism measure, which computes a description of each window and compares generated with real descriptions.
+    """A realism measure, which computes a description of each window and compares generated with
+    real descriptions.
 
     Args:
         name: Name of the measure.
-        describe: Function from windows of shape `(windows, samples)` to their descriptions, one row for each window.
+        describe: Function from windows of shape `(windows, samples)` to their descriptions, one row
+            for each window.
         compare: Function from generated and real descriptions to the value of the measure.
         perfect: Value for perfect noise. Larger and smaller values are both worse.
         is_ratio: Whether the departure from the perfect value is computed on the logarithms.
-        max_resplits: Maximum number of resamples for the real-vs-real baseline; fewer for expensive measures.
+        max_resplits: Maximum number of resamples for the real-vs-real baseline; fewer for expensive
+            measures.
     """
 
     name: str
@@ -120,7 +128,8 @@ class Row(NamedTuple):
     Args:
         measure: Name of the measure.
         value: Value of the measure for generated windows compared with real windows.
-        ratio: Its departure from the perfect value, divided by the mean departure of real windows: about 1 for perfect noise.
+        ratio: Its departure from the perfect value, divided by the mean departure of real windows:
+            about 1 for perfect noise.
     """
 
     measure: str
@@ -129,7 +138,8 @@ class Row(NamedTuple):
 
 
 class RealFloor:
-    """Real-vs-real baselines of all measures for one kind of noise, to which generated windows are compared.
+    """Real-vs-real baselines of all measures for one kind of noise, to which generated windows are
+    compared.
 
     Args:
         real: Real windows of shape `(windows, samples)`, in the order of time and without overlaps.
@@ -147,9 +157,12 @@ class RealFloor:
         seed: int = 0,
         measures: Sequence[Measure] = MEASURES,
     ):
-        self.measures, self.num_windows = tuple(measures), min(len(real), len(later_real))
-        self._offset, self._unit = np.mean(real, dtype=np.float64), np.std(real, dtype=np.float64)
-        real, later_real = self._standardised(real), self._standardised(later_real)
+        self.measures = tuple(measures)
+        self.num_windows = min(len(real), len(later_real))
+        self._offset = np.mean(real, dtype=np.float64)
+        self._unit = np.std(real, dtype=np.float64)
+        real = self._standardised(real)
+        later_real = self._standardised(later_real)
         describe = functools.cache(lambda function: (function(real), function(later_real)))
         self._real = {measure.describe: describe(measure.describe)[0] for measure in self.measures}
         splits = list(self._resplits(num_resplits, np.random.default_rng(seed)))
@@ -157,9 +170,8 @@ class RealFloor:
         """Mean departure of each measure for real windows compared with real windows."""
         for measure in self.measures:
             pooled = np.concatenate(describe(measure.describe))
-            with threadpool_limits(
-                1
-            ):  # on a busy machine, several threads that wait for each other are ten times slower
+            # on a busy machine, several threads that wait for each other are ten times slower
+            with threadpool_limits(1):
                 values = [
                     measure.compare(pooled[first], pooled[second])
                     for first, second in splits[: measure.max_resplits]
@@ -172,8 +184,8 @@ class RealFloor:
         """Compares generated windows with the real windows.
 
         Args:
-            generated: At least as many windows as there are real windows, of the same length and in the same unit. Additional
-                windows are ignored.
+            generated: At least as many windows as there are real windows, of the same length and in
+                the same unit. Additional windows are ignored.
 
         Returns:
             A row for each measure.
@@ -203,7 +215,9 @@ class RealFloor:
     def _resplits(
         self, num_resplits: int, rng: np.random.Generator
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yields pairs of index arrays. Blocks in time are assigned to the halves at random; each half keeps the order of time."""
+        """Yields pairs of index arrays. Blocks in time are assigned to the halves at random; each
+        half keeps the order of time.
+        """
         blocks = np.array_split(
             np.arange(2 * self.num_windows), max(2, 2 * self.num_windows // _BLOCK)
         )

@@ -1,4 +1,6 @@
-"""What the tables of the study say: false alarms, recall and realism of each noise model on each family, and whether a choice pays."""
+"""What the tables of the study say: false alarms, recall and realism of each noise model on each
+family, and whether a choice pays.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -19,14 +21,18 @@ KEPT = KeptTables(
     command="python -m studies.noise_models",
     former=("choice",),
 )
-MAX_ALARM_EXCESS = (
-    0.01  # by which the false-alarm rate may exceed that of detectors trained on real windows
-)
-MAX_RECALL_LOSS = 0.03  # by which the recall may be below that of detectors trained on real windows, at their own thresholds
-_MAX_AUC_EXCESS = 0.05  # by which the AUC of a classifier may exceed that of real windows against other real windows
+# by which the false-alarm rate may exceed that of detectors trained on real windows
+MAX_ALARM_EXCESS = 0.01
+# by which the recall may be below that of detectors trained on real windows, at their own
+# thresholds
+MAX_RECALL_LOSS = 0.03
+# by which the AUC of a classifier may exceed that of real windows against other real windows
+_MAX_AUC_EXCESS = 0.05
 MAX_REALISM_RATIO = 3.0  # of a measure to its value between two samples of real noise
 OFFERED = ("gaussian", "autoregression", "residual windows", "matched residual windows")
-"""The models among which the choice is followed. Without noise, detectors flag nearly every window, and `none` was tried on one seed."""
+"""The models among which the choice is followed. Without noise, detectors flag nearly every window,
+and `none` was tried on one seed.
+"""
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
@@ -36,8 +42,10 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         tables: As `KEPT` names them.
 
     Returns:
-        `families`: for each family whether it was looked at in the design, and for each model its results there; `models`: for each model
-        on how many families it keeps the tolerances; `seeds`; and `choice`, from a published table: how well a rule chooses among the models.
+        `families`: for each family whether it was looked at in the design, and for each model its
+            results there; `models`: for each model
+        on how many families it keeps the tolerances; `seeds`; and `choice`, from a published table:
+        how well a rule chooses among the models.
     """
     models = list(dict.fromkeys(tables["detectors"]["model"]))
     families = {}
@@ -62,7 +70,9 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
 
 
 def _by_seed(detectors: "pd.DataFrame", model: str) -> "pd.DataFrame":
-    """False-alarm rate and recall at own thresholds, means over the detectors, a row for each seed."""
+    """False-alarm rate and recall at own thresholds, means over the detectors, a row for each
+    seed.
+    """
     rows = detectors[detectors["model"] == model]
     return (
         rows.assign(alarms=rows["alarms"] / rows["windows"])
@@ -72,12 +82,12 @@ def _by_seed(detectors: "pd.DataFrame", model: str) -> "pd.DataFrame":
 
 
 def _on_family(tables: "Mapping[str, pd.DataFrame]", model: str) -> dict[str, Any]:
-    """Results of a model on a family, means over its seeds; differences are from detectors trained on real windows with the same seeds."""
+    """Results of a model on a family, means over its seeds; differences are from detectors trained
+    on real windows with the same seeds.
+    """
     own, real = (_by_seed(tables["detectors"], name) for name in (model, REAL))
-    realism, difference = (
-        tables["realism"][tables["realism"]["model"] == model],
-        own - real.loc[own.index],
-    )
+    realism = tables["realism"][tables["realism"]["model"] == model]
+    difference = own - real.loc[own.index]
     return {
         "seeds": [int(seed) for seed in own.index],
         "alarms": float(own["alarms"].mean()),
@@ -107,12 +117,15 @@ def _over_families(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _choices(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
-    """How well a rule chooses on each family and seed, beside always the same model: cases in which detectors keep both tolerances.
+    """How well a rule chooses on each family and seed, beside always the same model: cases in which
+    detectors keep both tolerances.
 
-    The rule takes the simplest model that passes: by a classifier, and by false alarms and recall of two fast detectors on held-out noise. If none
-    passes, it takes that with the smallest sum of the three excesses.
+    The rule takes the simplest model that passes: by a classifier, and by false alarms and recall
+    of two fast detectors on held-out noise. If none passes, it takes that with the smallest sum of
+    the three excesses.
     """
-    rows, detectors = tables["choice"], tables["detectors"]
+    rows = tables["choice"]
+    detectors = tables["detectors"]
     rows = rows.assign(
         order=rows["model"].map({name: number for number, name in enumerate(OFFERED)})
     ).dropna(subset="order")
@@ -129,7 +142,8 @@ def _choices(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     rows["departure"] = np.where(
         rows["passes"], rows["order"] - len(OFFERED), excess.clip(min=0).sum(axis=0)
     )
-    chosen, within = dict.fromkeys(OFFERED, 0), dict.fromkeys(("the rule", *OFFERED), 0)
+    chosen = dict.fromkeys(OFFERED, 0)
+    within = dict.fromkeys(("the rule", *OFFERED), 0)
     passing = judgements = 0
     for (family, seed), own in rows.groupby(["family", "seed"]):
         if len(own) < len(OFFERED):

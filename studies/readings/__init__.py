@@ -1,1 +1,3 @@
-"""Do the verdicts on the paper hold over readings of its text, seeds, and the rounding of the processor?"""
+"""Do the verdicts on the paper hold over readings of its text, seeds, and the rounding of the
+processor?
+"""

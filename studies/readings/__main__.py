@@ -1,4 +1,6 @@
-"""`python -m studies.readings`: do the verdicts on the paper hold over readings, seeds and roundings?"""
+"""`python -m studies.readings`: do the verdicts on the paper hold over readings, seeds and
+roundings?
+"""
 
 import argparse
 import sys
@@ -6,6 +8,7 @@ from pathlib import Path
 
 from enhsim_tf.common.console import Parser, run_command, tell
 from enhsim_tf.common.errors import InputError
+from studies.common.command import add_budget_and_cache
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
@@ -14,18 +17,13 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         prog="python -m studies.readings",
         description="Runs the paper over readings, seeds and roundings.",
     )
+    add_budget_and_cache(parser)
     parser.add_argument(
-        "--budget",
-        choices=("smoke", "full"),
-        default="full",
-        help="size of the runs (default: full, which takes hours)",
-    )
-    parser.add_argument(
-        "--reference-seeds",
+        "--column-seeds",
         type=int,
         default=10,
         metavar="N",
-        help="seeds of the reference (default: 10)",
+        help="seeds of the base and of the author's configuration (default: 10)",
     )
     parser.add_argument(
         "--other-seeds",
@@ -37,23 +35,17 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--another-processor",
         action="store_true",
-        help="only the reference, on another processor than the runs of DIR",
+        help="only these two, on another processor than the runs of DIR",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("results/readings"), metavar="DIR", help="output folder"
-    )
-    parser.add_argument(
-        "--cache",
-        type=Path,
-        metavar="DIR",
-        help="folder of cached stages (default: .cache in a checkout)",
     )
     return parser.parse_args(arguments)
 
 
 def run(options: argparse.Namespace) -> int:
     """Runs the study and returns the exit code."""
-    if min(options.reference_seeds, options.other_seeds) < 1:
+    if min(options.column_seeds, options.other_seeds) < 1:
         raise InputError("Expected at least one seed of each reading. Received: 0 or fewer.")
     from enhsim_tf.common.atomic_files import make_folder, write_json
     from enhsim_tf.common.stages import default_cache
@@ -61,22 +53,18 @@ def run(options: argparse.Namespace) -> int:
     from studies.common.replicates import save_all
     from studies.readings.figure import FIGURES
     from studies.readings.run import collect, runs
-    from studies.readings.summary import publish, shares, verdicts
+    from studies.readings.summary import publish, shares
 
-    out, planned = (
-        make_folder(options.out),
-        runs(options.reference_seeds, options.other_seeds, options.another_processor),
-    )
+    out = make_folder(options.out)
+    planned = runs(options.column_seeds, options.other_seeds, options.another_processor)
     table = collect(planned, options.budget, options.cache or default_cache(), out, tell)
-    write_json(out / PUBLISHED.name, publish(table))
-    save_all(
-        FIGURES,
-        {"shares": shares(verdicts(table)), "budget": options.budget},
-        out,
-        "python -m studies.readings",
-    )
+    published = publish(table)
+    write_json(out / PUBLISHED.name, published)
+    about = {"shares": shares(table), "basis": published["basis"], "budget": options.budget}
+    save_all(FIGURES, about, out, "python -m studies.readings")
     tell(
-        f"table, {PUBLISHED.name} and figure in {out}/; a maintainer copies {PUBLISHED.name} to {PUBLISHED.parent.name}/"
+        f"table, {PUBLISHED.name} and figure in {out}/; a maintainer copies {PUBLISHED.name} to "
+        f"{PUBLISHED.parent.name}/"
     )
     return 0
 

@@ -1,13 +1,14 @@
-"""The figure of the study: claims by readings, with the share of runs that has each verdict."""
+"""The figure of the study: verdicts on each claim against the factor of all limits."""
 
 import matplotlib.figure
 import pandas as pd
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import DOUBLE, LINE, QUIET, REAL, new_sheet, panels
+from enhsim_tf.common.plot_style import DOUBLE, EDGE, LINE, QUIET, REAL, new_sheet, panels
 from enhsim_tf.paper.claims import CLAIMS, NOT_REPRODUCED, PARTLY, REPRODUCED
-from studies.readings.run import READINGS
+from studies.readings.run import DECIDING
 
+MESSAGE = "With limits halved or doubled, C6, C8 and C9 still fail"
 COLORS = {REPRODUCED: "#0b5a38", PARTLY: "#e0a93a", NOT_REPRODUCED: "#f3c9c3"}
 """From dark to light, so that they stay apart in grey."""
 
@@ -17,57 +18,51 @@ def draw(data: dict) -> matplotlib.figure.Figure:
     shares: pd.DataFrame = data["shares"]
     figure, down = new_sheet(
         DOUBLE,
-        3.6,
-        "C6 fails in nearly all runs; C4 and C5 turn",
-        "Share of runs; empty where a reading changes nothing.",
+        5.2,
+        MESSAGE,
+        "Shares of runs with each verdict over the factor by which the distances of all limits "
+        "from "
+        f"the ideal are multiplied: {data['basis']}.",
     )
-    axes = panels(figure, down + 0.35, 1, 1, right=0.1)[0, 0]
-    box = axes.get_position()
-    axes.set_position((0.27, box.y0 - 0.06, 0.71, box.height + 0.06))
-    readings = list(READINGS)
-    for row in shares.itertuples(index=False):
-        part = shares[(shares["reading"] == row.reading) & (shares["claim"] == row.claim)]
-        before = sum(
-            part.loc[part["verdict"] == verdict, "share"].sum()
-            for verdict in list(COLORS)[: list(COLORS).index(row.verdict)]
-        )
-        left = int(row.claim[1]) - 1 + 0.86 * before
-        axes.barh(
-            readings.index(row.reading),
-            0.86 * row.share,
-            left=left,
-            height=0.7,
-            color=COLORS[row.verdict],
-            edgecolor=LINE,
-            linewidth=0.3,
-        )
-    axes.set_yticks(range(len(readings)), readings)
-    axes.set_xticks(
-        [number + 0.43 for number in range(len(CLAIMS))], [claim.id for claim in CLAIMS]
-    )
-    axes.set(xlim=(-0.05, len(CLAIMS)), ylim=(len(readings) - 0.4, -0.6))
-    axes.tick_params(length=0, labelcolor=REAL)
-    axes.spines[["left", "bottom"]].set_visible(False)
+    axes = panels(figure, down + 0.45, len(CLAIMS), 3, gap=(0.07, 0.2), sharex=True, sharey=True)
+    for column, name in enumerate(DECIDING):
+        axes[0, column].set_title(name, loc="left", weight="bold")
+        for row, claim in enumerate(CLAIMS):
+            panel = axes[row, column]
+            chosen = (shares["column"] == name) & (shares["claim"] == claim.id)
+            part = shares[chosen]
+            panel.stackplot(
+                part["factor"],
+                *(part[verdict] for verdict in COLORS),
+                colors=COLORS.values(),
+                linewidth=0,
+                step="mid",
+            )
+            for factor in (0.5, 1, 2):
+                style = "-" if factor == 1 else ":"
+                panel.axvline(factor, color=LINE, linewidth=0.8, linestyle=style)
+            panel.set(xscale="log", xlim=(0.25, 4), ylim=(0, 1), yticks=[])
+            if not column:
+                panel.set_ylabel(claim.id, rotation=0, ha="right", va="center", color=REAL)
+        axes[-1, column].set_xticks([0.25, 0.5, 1, 2, 4], ["¼", "½", "1", "2", "4"])
+        axes[-1, column].minorticks_off()
+        axes[-1, column].set_xlabel("factor of all limits")
+    width, height = figure.get_size_inches()
     for number, (verdict, color) in enumerate(COLORS.items()):
-        axes.scatter(
-            1 + 2.5 * number,
-            -1.05,
-            s=36,
-            marker="s",
-            color=color,
-            edgecolor=LINE,
-            linewidth=0.3,
-            clip_on=False,
-        )
-        axes.text(1.2 + 2.5 * number, -1.05, verdict, va="center", color=QUIET)
+        x = EDGE + 1.1 * number
+        y = height - down - 0.16
+        figure.text(x / width, y / height, "■", color=color, size=9)
+        figure.text((x + 0.14) / width, y / height, verdict, color=QUIET, size=7.5)
     return figure
 
 
 FIGURES = {
     "verdicts": Figure(
         1,
-        "Verdicts on each claim by reading of the paper",
-        "Grid of claims by readings; each cell shows the shares of runs in which the claim is reproduced, partly, and not.",
+        "Verdicts on each claim against the factor of all limits",
+        "For each claim and both columns, the shares of runs in which it is reproduced, "
+        "partly, and "
+        "not, over the factor by which the distances of all limits are multiplied.",
         draw,
     )
 }

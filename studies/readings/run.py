@@ -1,9 +1,13 @@
-"""Runs the paper once for each reading, seed and rounding, and keeps every measurement of every run in one table.
+"""Runs the paper once for each reading, seed and rounding, and keeps every measurement of every run
+in one table.
 
-A reading is the reference with one setting changed. A run is a process of its own, because TensorFlow chooses its rounding when it
-starts. The stages that a reading does not touch come from the cache, and the table is written after every finished run.
+A reading is the base with some settings changed. A run is a process of its own, because TensorFlow
+chooses its rounding when it starts. The stages that a reading does not touch come from the cache,
+and the table is written after every finished run.
 """
 
+import itertools
+import math
 import os
 import subprocess
 import sys
@@ -15,21 +19,62 @@ import pandas as pd
 
 from enhsim_tf.common.atomic_files import replace_file
 
-READINGS: Mapping[str, Mapping[str, Any]] = {
-    "reference": {},
-    "he_uniform in every layer": {"initialisers": "he_uniform"},
+BASE = "base"
+AUTHOR = "author's configuration"
+COLUMNS = (BASE, AUTHOR)
+"""The readings that decide verdicts, beside the former base."""
+PLANNED = 20  # runs of each: ten seeds, two roundings
+FACTORS: Mapping[str, Mapping[str, Any]] = {
+    "2 pi": {"latent_scale": 2 * math.pi},
+    "two updates": {"update": "two of 200"},
     "no dropout": {"dropout": 0},
-    "latent scale 4": {"latent_scale": 4},
-    "latent scale 2 pi": {"latent_scale": 6.283185},
-    "one update, 200 + 200 rows": {"update": "mixed 200 + 200"},
-    "two updates of 200 rows": {"update": "two of 200"},
+    "he_uniform": {"initialisers": "he_uniform"},
+    "no average": {"average": "none"},
+}
+"""Changes of the factorial."""
+
+
+def _changed(names: tuple[str, ...]) -> dict[str, Any]:
+    return {key: value for name in names for key, value in FACTORS[name].items()}
+
+
+FACTORIAL = {
+    " + ".join(names) or BASE: _changed(names)
+    for number in (0, 2, 4)
+    for names in itertools.combinations(FACTORS, number)
+}
+"""Half of all combinations, those with an even number of changes: resolution V, in which neither
+single changes nor pairs of them are confounded with each other.
+"""
+SINGLE: Mapping[str, Mapping[str, Any]] = {
+    "average over 15": {"moving_average": 15},
+    "average over 51": {"moving_average": 51},
     "trailing average": {"average": "trailing"},
+    "latent scale 1": {"latent_scale": 1},
     "learning rate 0.01": {"learning_rate": 0.01},
+}
+CONTROLS: Mapping[str, Mapping[str, Any]] = {
+    f"{AUTHOR}, white noise": FACTORS["two updates"] | FACTORS["no average"],
+    f"{AUTHOR}, 2 pi": FACTORS["two updates"] | FACTORS["2 pi"],
+    f"{AUTHOR}, 5,000 iterations": FACTORS["two updates"] | {"iterations": 5_000},
+}
+"""What `studies.author_code` runs with the author's code."""
+FORMER = "former base"
+KEPT: Mapping[str, Mapping[str, Any]] = {
+    FORMER: {"latent_scale": 1},
     "15,000 windows": {"num_windows": 15_000},
 }
+"""Readings that an earlier version ran, and that are not run again. The former base also showed its
+GAN 1,500 rows again and again; C2 is wall time, and C4 was measured otherwise. Of 15,000 windows,
+C1 and C3 are kept.
+"""
+DECIDING = (*COLUMNS, FORMER)
+READINGS = {BASE: {}, AUTHOR: FACTORS["two updates"]} | FACTORIAL | SINGLE | CONTROLS | KEPT
 ANOTHER = "oneDNN, another processor"
 ROUNDINGS = {"oneDNN": "1", "Eigen": "0", ANOTHER: "1"}
-"""Values of `TF_ENABLE_ONEDNN_OPTS`, by the library whose order of summation they choose, which also depends on the processor."""
+"""Values of `TF_ENABLE_ONEDNN_OPTS`, by the library whose order of summation they choose, which
+also depends on the processor.
+"""
 TABLE = "measurements.parquet"
 KEYS = ["reading", "rounding", "seed"]
 
@@ -48,26 +93,31 @@ class Run(NamedTuple):
     seed: int
 
 
-def runs(num_reference: int, num_other: int, on_another: bool = False) -> list[Run]:
-    """The runs in their order: all readings with one seed before the next seed, the reference with both roundings of the processor.
+def runs(num_columns: int, num_others: int, on_another: bool = False) -> list[Run]:
+    """The runs in their order, in each step all readings with one seed before the next seed: both
+    columns, then the other readings, then the columns with another rounding.
 
     Args:
-        num_reference: Number of seeds of the reference.
-        num_other: Number of seeds of every other reading.
-        on_another: Whether this is another processor than that of the other runs; only the reference is run on it.
+        num_columns: Number of seeds of the columns, and of the control with white noise.
+        num_others: Number of seeds of every other reading, of 5,000 iterations at most three.
+        on_another: Whether this is another processor than that of the other runs; only the
+            columns are run on it.
     """
+
+    def of_columns(rounding: str) -> list[Run]:
+        return [Run(reading, rounding, seed) for seed in range(num_columns) for reading in COLUMNS]
+
     if on_another:
-        return [Run("reference", ANOTHER, seed) for seed in range(num_reference)]
-    planned = []
-    for seed in range(max(num_reference, num_other)):
-        for reading in READINGS:
-            if seed < (num_reference if reading == "reference" else num_other):
-                planned += [
-                    Run(reading, rounding, seed)
-                    for rounding in ("oneDNN", "Eigen")
-                    if reading == "reference" or rounding == "oneDNN"
-                ]
-    return planned
+        return of_columns(ANOTHER)
+    white, _, long = CONTROLS
+    seeds = {white: num_columns, long: min(num_others, 3)}
+    others = [
+        Run(reading, "oneDNN", seed)
+        for seed in range(max(num_columns, num_others))
+        for reading in READINGS
+        if reading not in (*COLUMNS, *KEPT) and seed < seeds.get(reading, num_others)
+    ]
+    return of_columns("oneDNN") + others + of_columns("Eigen")
 
 
 def collect(
@@ -94,7 +144,8 @@ def collect(
     done = {Run(*row) for row in table[KEYS].drop_duplicates().itertuples(index=False)}
     for number, run in enumerate(planned, 1):
         tell(
-            f"run {number} of {len(planned)}: {run.reading}, {run.rounding}, seed {run.seed}{' (in the table)' if run in done else ''}"
+            f"run {number} of {len(planned)}: {run.reading}, {run.rounding}, seed "
+            f"{run.seed}{' (in the table)' if run in done else ''}"
         )
         if run in done:
             continue

@@ -1,21 +1,51 @@
-"""From the table of measurements to verdicts over readings, seeds and roundings, and to what the command compares its runs with.
+"""From the table of measurements to verdicts over readings, seeds and roundings, and to what the
+command compares its runs with.
 
-A claim has the verdict of at least 80 % of the reference's runs if most readings that touch the claim have it, too. Otherwise it is
-undecided, and the readings that differ are named. Verdicts are computed from the measurements, so that a limit can change without a run.
+Three readings decide: the base, the author's configuration, and the former base. A claim has the
+verdict of at least 80 % of the runs of each that has at least five, with all limits as they are, at
+half and at twice their distances from the ideal. Otherwise it is undecided, and what turns it is
+named. Verdicts are computed from the measurements, so that a limit
+can change without a run.
 """
 
 import collections
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.paper.claims import CLAIMS, NOT_REPRODUCED, OF_UNTESTED, PARTLY, REPRODUCED, verdict
+from enhsim_tf.paper.claims import (
+    CLAIMS,
+    NOT_REPRODUCED,
+    OF_UNTESTED,
+    PARTLY,
+    REPRODUCED,
+    SHOWN,
+    Claim,
+    Limit,
+    title,
+    verdict,
+)
 from enhsim_tf.paper.report import UNDECIDED
 from enhsim_tf.paper.settings import make_settings
-from studies.readings.run import KEYS, READINGS
+from studies.readings.run import (
+    AUTHOR,
+    BASE,
+    DECIDING,
+    FACTORS,
+    FORMER,
+    KEYS,
+    PLANNED,
+    READINGS,
+)
 
 SHARE = 0.8
+FEWEST = 5
+HALVED = 0.5
+AS_FIXED = 1.0
+DOUBLED = 2.0
+VERDICTS = (REPRODUCED, PARTLY, NOT_REPRODUCED)
 TOUCHED_BY = {
     "C1": {"windows", "enhancer"},
     "C2": set(),
@@ -31,8 +61,10 @@ TOUCHED_BY = {
 
 
 def touches(reading: str, claim: str) -> bool:
-    """Whether a reading changes something on which a claim depends. C4 is measured on the reference alone."""
-    if reading == "reference":
+    """Whether a reading changes something on which a claim depends. C4 is measured on the columns
+    alone.
+    """
+    if reading in DECIDING:
         return True
     changed = make_settings(**READINGS[reading])
     return claim != "C4" and any(
@@ -40,99 +72,234 @@ def touches(reading: str, claim: str) -> bool:
     )
 
 
-def verdicts(table: pd.DataFrame) -> pd.DataFrame:
+def measurements(table: pd.DataFrame, claim: str) -> pd.DataFrame:
+    """The measurements of a claim: one row for each run, one column for each name.
+
+    Args:
+        table: The table of `run.collect`.
+        claim: The claim's id.
+    """
+    return table[table["claim"] == claim].pivot(index=KEYS, columns="name", values="value")
+
+
+def verdicts(
+    table: pd.DataFrame, factor: float = AS_FIXED, claims: Sequence[Claim] = CLAIMS
+) -> pd.DataFrame:
     """The verdict on each claim in each run.
 
     Args:
         table: The table of `run.collect`.
+        factor: By which the distance of each limit from its ideal is multiplied.
+        claims: The claims with their limits.
 
     Returns:
-        Columns `reading`, `rounding`, `seed`, `claim` and `verdict`, without claims that were not measured.
+        Columns `reading`, `rounding`, `seed`, `claim` and `verdict`, without claims that were not
+        measured.
     """
-    limits = {claim.id: claim.limits for claim in CLAIMS}
-    rows = []
-    for (*run, claim), part in table.groupby([*KEYS, "claim"], sort=False):
-        rows.append(
-            (
-                *run,
-                claim,
-                verdict(limits[claim], dict(zip(part["name"], part["value"], strict=True))),
-            )
-        )
+    rows = [
+        (*run, claim.id, verdict(claim.limits, measured, factor))
+        for claim in claims
+        for run, measured in measurements(table, claim.id).to_dict("index").items()
+    ]
     return pd.DataFrame(rows, columns=[*KEYS, "claim", "verdict"])
 
 
-def decide(found: pd.DataFrame, claim: str) -> dict[str, Any]:
+def num_runs(table: pd.DataFrame, reading: str) -> int:
+    """The number of runs of a reading."""
+    return len(table.loc[table["reading"] == reading, KEYS].drop_duplicates())
+
+
+def counts(found: pd.DataFrame, reading: str, claim: str) -> collections.Counter:
+    """How many runs of a reading have each verdict on a claim."""
+    chosen = (found["reading"] == reading) & (found["claim"] == claim)
+    return collections.Counter(found.loc[chosen, "verdict"])
+
+
+def agreed(given: collections.Counter) -> str:
+    """The verdict of at least `SHARE` of the runs, or `UNDECIDED`."""
+    for common, number in given.most_common(1):
+        if number >= SHARE * given.total():
+            return common
+    return UNDECIDED
+
+
+def decide(table: pd.DataFrame, claim: Claim) -> dict[str, Any]:
     """The published verdict on one claim.
 
     Args:
-        found: The result of `verdicts`.
-        claim: Its id.
+        table: The table of `run.collect`.
+        claim: The claim.
 
     Returns:
-        `verdict`; `runs`, the numbers of runs of the reference in which the claim is reproduced, partly reproduced and not; and
-        `decided_by`, the readings that differ if it is undecided, or None.
+        `verdict`; `runs`, the numbers of runs in which the claim is reproduced, partly reproduced
+        and not; `by_reading`, the same for each deciding reading; and `decided_by`, what turns an
+        undecided claim, or None.
     """
-    of_claim = found[found["claim"] == claim]
-    counts = {
-        reading: collections.Counter(part["verdict"])
-        for reading, part in of_claim.groupby("reading", sort=False)
+    factors = {HALVED: "limits halved", AS_FIXED: "", DOUBLED: "limits doubled"}
+    of_factor = {factor: verdicts(table, factor, [claim]) for factor in factors}
+    of_column = {name: counts(of_factor[AS_FIXED], name, claim.id) for name in DECIDING}
+    given = {
+        (column, factor): agreed(counts(found, column, claim.id))
+        for factor, found in of_factor.items()
+        for column in DECIDING
+        if of_column[column].total() >= FEWEST
     }
-    of_reading = {
-        reading: count.most_common(1)[0][0]
-        for reading, count in counts.items()
-        if touches(reading, claim)
-    }
-    common, agreeing = counts["reference"].most_common(1)[0]
-    total = counts["reference"].total()
-    others = {reading: each for reading, each in of_reading.items() if reading != "reference"}
-    differing = [reading for reading, each in others.items() if each != common]
-    is_decided = agreeing >= SHARE * total and 2 * len(differing) < max(len(others), 1)
-    causes = differing if agreeing >= SHARE * total else ["seed", *differing]
+    as_fixed = {column: found for (column, factor), found in given.items() if factor == AS_FIXED}
+    (common, _), *_ = [*collections.Counter(as_fixed.values()).most_common(1), (UNDECIDED, 0)]
+    causes = ["seed"] if UNDECIDED in as_fixed.values() else []
+    if not given:
+        causes = ["too few runs"]
+    elif not causes:
+        causes = [column for column, found in as_fixed.items() if found != common]
+    causes += [
+        words
+        for factor, words in factors.items()
+        if any(given[column, factor] != found for column, found in as_fixed.items())
+    ]
     return {
-        "verdict": common if is_decided else UNDECIDED,
-        "runs": [counts["reference"][each] for each in (REPRODUCED, PARTLY, NOT_REPRODUCED)],
-        "decided_by": None if is_decided else ", ".join(causes),
+        "verdict": UNDECIDED if causes else common,
+        "runs": [sum(count[each] for count in of_column.values()) for each in VERDICTS],
+        "by_reading": {
+            name: [count[each] for each in VERDICTS] for name, count in of_column.items()
+        },
+        "decided_by": ", ".join(causes) or None,
     }
 
 
 def publish(table: pd.DataFrame) -> dict[str, Any]:
-    """The content of `enhsim_tf/paper/published.json`; see `enhsim_tf.paper.report.read_published`."""
-    found, claims = verdicts(table), {}
-    reference = table[table["reading"] == "reference"]
+    """The content of `enhsim_tf/paper/published.json`; see
+    `enhsim_tf.paper.report.read_published`.
+    """
+    decisive = table[table["reading"].isin(DECIDING)]
+    claims = {}
     for claim in CLAIMS:
-        decided = decide(found, claim.id)
+        decided = decide(table, claim)
         if not claim.is_tested:
             decided["verdict"] = OF_UNTESTED.get(decided["verdict"], decided["verdict"])
-        values = reference[reference["claim"] == claim.id].groupby("name")["value"]
-        low, high = values.min(), values.max()
+        names = dict.fromkeys(limit.name for limit in claim.limits)
+        values = measurements(decisive, claim.id).reindex(columns=names)
         ranges = {
-            name: [float(low[name]), float(high[name])]
-            for name in dict.fromkeys(limit.name for limit in claim.limits)
+            name: [float(values[name].min()), float(values[name].max())]
+            for name in names
+            if values[name].count() >= FEWEST
         }
         claims[claim.id] = decided | {"ranges": ranges}
-    tested = [claims[claim.id]["verdict"] for claim in CLAIMS if claim.is_tested]
-    sign = (
-        "[¬Re]"
-        if NOT_REPRODUCED in tested
-        else "[Re]"
-        if set(tested) == {REPRODUCED}
-        else "[Re, in part]"
-    )
-    seeds, roundings, readings = (
-        reference["seed"].nunique(),
-        reference["rounding"].nunique(),
-        table["reading"].nunique(),
-    )
+    done = {name: num_runs(table, name) for name in DECIDING}
     return {
-        "title": sign,
-        "basis": f"seeds of the reference: {seeds}, roundings: {roundings}; readings: {readings}",
+        "title": title([claims[claim.id]["verdict"] for claim in CLAIMS if claim.is_tested]),
+        "basis": f"{done[BASE]} of {PLANNED} runs of the base, {done[AUTHOR]} of {PLANNED} of the "
+        f"author's configuration, {done[FORMER]} of the former base",
         "claims": claims,
     }
 
 
+def signs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    """On what the title depends: with each statistic of C6 in place of the AUC, and by column, in
+    how many runs C6 holds with limits halved, as they are, and doubled, and the signs that follow.
+
+    Returns:
+        Header and rows.
+    """
+    sixth = next(claim for claim in CLAIMS if claim.id == "C6")
+    shown = [limit for limit in sixth.limits if limit.decides == SHOWN]
+    ways: dict[str, tuple[Limit, ...]] = {"AUC over its floor": sixth.limits}
+    ways |= {limit.words: (basic(limit),) for limit in shown}
+    ways["all of these but the AUC and the rank"] = tuple(map(basic, shown[:-1]))
+    columns = [column for column in DECIDING if num_runs(table, column) >= FEWEST]
+    factors = (HALVED, AS_FIXED, DOUBLED)
+    others = {
+        (column, factor): [
+            agreed(counts(found, column, claim.id))
+            for claim in CLAIMS
+            if claim.is_tested and claim is not sixth
+        ]
+        for factor in factors
+        for found in [verdicts(table, factor)]
+        for column in columns
+    }
+    rows = []
+    for words, limits in ways.items():
+        claim = Claim(**vars(sixth) | {"limits": limits})
+        row = [words]
+        for column in columns:
+            given = [
+                counts(verdicts(table[table["reading"] == column], factor, [claim]), column, "C6")
+                for factor in factors
+            ]
+            holds = [str(each[REPRODUCED] + each[PARTLY]) for each in given]
+            reached = [
+                title([*others[column, factor], agreed(each)])
+                for factor, each in zip(factors, given, strict=True)
+            ]
+            told = reached[:1] if len(set(reached)) == 1 else reached
+            row.append(f"{', '.join(holds)}: {', '.join(told)}")
+        rows.append(row)
+    return [
+        "C6 decided by",
+        *(f"{column}, {num_runs(table, column)} runs" for column in columns),
+    ], rows
+
+
+def basic(limit: Limit) -> Limit:
+    """The same limit as a basic one."""
+    return Limit(**vars(limit) | {"decides": "basic"})
+
+
+def effects(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    """What each change of the factorial does to some measurements, and the largest effect of a pair
+    of changes: differences of means, with 95 % intervals by Student's t over seeds.
+
+    Returns:
+        Header and rows; no rows without a seed that has all runs of the factorial.
+    """
+    from studies.common.statistics import t_interval
+    from studies.readings.run import FACTORIAL
+
+    complete = table[(table["rounding"] == "oneDNN") & table["reading"].isin(FACTORIAL)]
+    signs_of = pd.DataFrame(
+        {name: {reading: 1 if name in reading else -1 for reading in FACTORIAL} for name in FACTORS}
+    )
+    pairs = {
+        f"{one} x {other}": signs_of[one] * signs_of[other]
+        for at, one in enumerate(FACTORS)
+        for other in list(FACTORS)[at + 1 :]
+    }
+    rows = []
+    for claim, name in MEASURED:
+        values = measurements(complete, claim).reindex(columns=[name])[name]
+        values = values.unstack("reading").dropna()
+        if not len(values) or set(values.columns) != set(FACTORIAL):
+            continue
+        row = [f"{claim}: {name}", f"{values.to_numpy().mean():.3g}"]
+        for change in FACTORS:
+            row.append(_effect(t_interval(2 * (values * signs_of[change]).mean(axis=1))))
+        found = {pair: t_interval(2 * (values * sign).mean(axis=1)) for pair, sign in pairs.items()}
+        largest = max(found, key=lambda pair: abs(found[pair]["mean"]))
+        rows.append([*row, f"{largest}: {_effect(found[largest])}"])
+    return ["measurement", "mean", *FACTORS, "largest pair"], rows
+
+
+MEASURED = (
+    ("C5", "late_accuracy"),
+    ("C6", "auc_over_floor"),
+    ("C6", "scale_difference"),
+    ("C6", "lag_one_error"),
+    ("C6", "rank_ratio"),
+    ("C7", "auc_over_floor"),
+    ("C8", "worse_half"),
+)
+"""Measurements for which the effects are shown."""
+
+
+def _effect(found: Mapping[str, float | None]) -> str:
+    if found["low"] is None:
+        return f"{found['mean']:+.3g}"
+    return f"{found['mean']:+.3g} ({found['low']:+.3g} to {found['high']:+.3g})"
+
+
 def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """The table of the README: for each reading its number of runs, and on each claim the most common verdict with its share of the runs.
+    """The table of the README: for each reading its number of runs, and on each claim the most
+    common verdict with its share of the runs.
 
     Args:
         found: The result of `verdicts`.
@@ -145,27 +312,29 @@ def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     for reading, runs in found.groupby("reading", sort=False):
         row = [reading, str(len(runs[["rounding", "seed"]].drop_duplicates()))]
         for claim in claims:
-            given = collections.Counter(runs.loc[runs["claim"] == claim, "verdict"])
-            verdict, number = given.most_common(1)[0] if given else ("", 0)
+            given = counts(runs, reading, claim) if touches(reading, claim) else None
             row.append(
-                f"{verdict} {number}/{given.total()}" if given and touches(reading, claim) else ""
+                f"{given.most_common(1)[0][0]} {given.most_common(1)[0][1]}/{given.total()}"
+                if given
+                else ""
             )
         rows.append(row)
     return ["reading", "runs", *claims], rows
 
 
-def shares(found: pd.DataFrame) -> pd.DataFrame:
-    """The share of runs with each verdict, by reading, claim and verdict, for the figure and the table of the README."""
-    is_touched = np.array(
-        [
-            touches(reading, claim)
-            for reading, claim in zip(found["reading"], found["claim"], strict=True)
-        ],
-        bool,
-    )
-    counts = (
-        found[is_touched]
-        .groupby(["reading", "claim"], sort=False)["verdict"]
-        .value_counts(normalize=True)
-    )
-    return counts.rename("share").reset_index()
+def shares(table: pd.DataFrame) -> pd.DataFrame:
+    """The share of runs of each column, and of the former base, with each verdict on each claim, by
+    the factor of the limits, for the figure.
+
+    Returns:
+        Columns `column`, `claim`, `factor` and one for each of `VERDICTS`.
+    """
+    rows = []
+    for factor in np.geomspace(0.25, 4, 33):
+        found = verdicts(table, float(factor))
+        for column in DECIDING:
+            for claim in CLAIMS:
+                given = counts(found, column, claim.id)
+                part = [given[each] / max(given.total(), 1) for each in VERDICTS]
+                rows.append((column, claim.id, factor, *part))
+    return pd.DataFrame(rows, columns=["column", "claim", "factor", *VERDICTS])

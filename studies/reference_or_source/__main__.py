@@ -1,14 +1,22 @@
-"""`python -m studies.reference_or_source`: when is an enhanced simulator worth having, and for what?"""
+"""`python -m studies.reference_or_source`: when is an enhanced simulator worth having, and for
+what?
+"""
 
 import sys
+from pathlib import Path
 
 from studies.common.command import Command
 
 OPTIONS = {
     "--system": {
-        "choices": ("battery", "aircraft"),
-        "help": "study this system only (default: both)",
-    }
+        "choices": ("battery", "aircraft", "cells"),
+        "help": "study this system only (default: all)",
+    },
+    "--data": {
+        "type": Path,
+        "metavar": "FOLDER",
+        "help": "NASA's battery data set: B0005.csv, B0029.mat and their like",
+    },
 }
 command = Command(
     "reference_or_source",

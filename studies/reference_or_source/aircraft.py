@@ -1,4 +1,6 @@
-"""An A320 and its coarse simulators, from the same model with wrong parameters to a point mass, for the study."""
+"""An A320 and its coarse simulators, from the same model with wrong parameters to a point mass, for
+the study.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -33,27 +35,29 @@ VEHICLES = {
 | gains of the autopilot | 1 | 0.9 |
 """
 POINT_MASSES = {"wrong physics": True, "missing state": False}
-"""The point masses, and whether the climb rate has its lag: without it a run changes more than without that of airspeed or N1."""
+"""The point masses, and whether the climb rate has its lag: without it a run changes more than
+without that of airspeed or N1.
+"""
 NOISE_SD = (0.5, 30.0, 0.05, 0.1, 0.1, 6.0)
 """Standard deviation of each channel's sensor noise, in the channel's unit."""
 RESOLUTION = (0.25, 16.0, 0.05, 0.1, 0.1, 4.0)
 """Resolution of each channel's sensor, in the channel's unit."""
 _HOLDS_S = (60, 120)  # shortest and longest time between two steps of a target; the mean is 90 s
-_TARGETS = (
-    ((8_000, 16_000), 1_500, 100),
-    ((230, 290), 20, 1),
-)  # limits, largest step and grid of altitude in feet and airspeed in knots
+# limits, largest step and grid of altitude in feet and airspeed in knots
+_TARGETS = ((8_000, 16_000), 1_500, 100), ((230, 290), 20, 1)
 
 
 class Aircraft:
     """An A320 in JSBSim that flies targets of altitude and airspeed.
 
-    Its telemetry is airspeed as it reads in knots, climb rate in feet a minute, pitch in degrees, N1 of the left and the right engine in
-    percent and altitude in feet, once a second. A flight lasts 20 minutes and starts in the air, trimmed at its first targets. A fault
-    acts from sample `onset` of every flight to its end.
+    Its telemetry is airspeed as it reads in knots, climb rate in feet a minute, pitch in degrees,
+    N1 of the left and the right engine in percent and altitude in feet, once a second. A flight
+    lasts 20 minutes and starts in the air, trimmed at its first targets. A fault acts from sample
+    `onset` of every flight to its end.
     """
 
     name = "aircraft"
+    is_continuous = False
     channels = ("airspeed", "climb rate", "pitch", "N1 left", "N1 right", "altitude")
     coarse_columns = (*channels, *COMMANDS)
     interval_s = 1.0
@@ -65,7 +69,8 @@ class Aircraft:
     parameters = tuple(field.name for field in dataclasses.fields(Constants))
     """Parameters of the point mass that can be fitted to telemetry."""
     first_values = np.array([field.default for field in dataclasses.fields(Constants)])
-    steps, bounds = first_values / 2, (-1.8, 6.0)
+    steps = first_values / 2
+    bounds = (-1.8, 6.0)
     """Unit of each parameter in the fit, and the limits of its change in these units."""
 
     check_installed = staticmethod(import_jsbsim)
@@ -74,7 +79,8 @@ class Aircraft:
         """Draws targets of some flights, each of which takes a random step every 60 to 120 seconds.
 
         Returns:
-            Target altitude in feet and airspeed in knots, float64 of shape `(num_units * unit_samples, 2)`.
+            Target altitude in feet and airspeed in knots, float64 of shape `(num_units *
+            unit_samples, 2)`.
         """
         drawn = [_draw_target(*each, rng) for _ in range(num_units) for each in _TARGETS]
         return (
@@ -82,6 +88,11 @@ class Aircraft:
             .swapaxes(1, 2)
             .reshape(-1, len(_TARGETS))
         )
+
+    def as_inputs(self, commands: np.ndarray) -> np.ndarray:
+        """The targets, around the middle of their limits and in units of half of the range."""
+        low, high = np.array([limits for limits, _, _ in _TARGETS], float).T
+        return (commands - (low + high) / 2) / ((high - low) / 2)
 
     def run_real(
         self,
@@ -93,12 +104,13 @@ class Aircraft:
 
         Args:
             commands: Targets, see `draw_commands`.
-            faults: Faults, each of which acts from sample `onset` of every flight; None for nominal.
+            faults: Faults, each of which acts from sample `onset` of every flight; None for
+                nominal.
             rng: Random number generator of the turbulence, which the runs share; None for calm air.
 
         Returns:
-            For each fault, the channels before the sensors' noise, float32 of shape `(samples, 6)`. The error of a pitot tube is in the
-            airspeed, and the autopilot flies by it.
+            For each fault, the channels before the sensors' noise, float32 of shape `(samples, 6)`.
+            The error of a pitot tube is in the airspeed, and the autopilot flies by it.
 
         Raises:
             InputError: If JSBSim is not installed, or `commands` cannot be flown.
@@ -123,17 +135,19 @@ class Aircraft:
         Args:
             simulator: One of `simulators`.
             commands: Targets, see `draw_commands`.
-            faults: Faults, each of which acts as far as the simulator can express it; None for nominal.
+            faults: Faults, each of which acts as far as the simulator can express it; None for
+                nominal.
             values: Values of `parameters` of a point mass; None: those of textbooks.
 
         Returns:
-            For each fault, columns `coarse_columns`: the channels as the simulator computes them, then the commands; float32 of shape
-            `(samples, 8)`.
+            For each fault, columns `coarse_columns`: the channels as the simulator computes them,
+            then the commands; float32 of shape `(samples, 8)`.
 
         Raises:
             InputError: If JSBSim is not installed although the simulator needs it.
         """
-        flights, found = _as_flights(commands), []
+        flights = _as_flights(commands)
+        found = []
         for fault in faults:
             if simulator in VEHICLES:
                 run = _fly_all(flights, VEHICLES[simulator], fault, [None] * len(flights))
@@ -146,28 +160,35 @@ class Aircraft:
         return found
 
     def can_simulate(self, simulator: str, kind: str) -> bool:
-        """Returns whether a coarse simulator can express a kind of fault: a point mass has no elevator."""
+        """Returns whether a coarse simulator can express a kind of fault: a point mass has no
+        elevator.
+        """
         return simulator in VEHICLES or kind != "elevator"
 
     def measure(
         self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0
     ) -> np.ndarray:
-        """Measures channels of shape `(samples, 6)` with sensors that add white noise, times `scale`, and round; returns float32."""
+        """Measures channels of shape `(samples, 6)` with sensors that add white noise, times
+        `scale`, and round; returns float32.
+        """
         return measure(values, scale * np.array(NOISE_SD), np.array(RESOLUTION), rng)
 
 
 def _draw_target(
     limits: tuple[int, int], step: int, grid: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """Draws one target over one flight: a random walk that limits reflect, in steps of at most `step`, rounded to a grid."""
-    target, value, begin = np.empty(UNIT_SAMPLES), rng.uniform(*limits), 0
+    """Draws one target over one flight: a random walk that limits reflect, in steps of at most
+    `step`, rounded to a grid.
+    """
+    target = np.empty(UNIT_SAMPLES)
+    value = rng.uniform(*limits)
+    begin = 0
     while begin < UNIT_SAMPLES:
         end = begin + int(rng.integers(_HOLDS_S[0], _HOLDS_S[1] + 1))
         target[begin:end] = np.rint(value / grid) * grid
         value += rng.uniform(-step, step)
-        value = limits[0] + abs(
-            value - limits[0]
-        )  # reflected at the lower limit, and then at the upper one
+        # reflected at the lower limit, and then at the upper one
+        value = limits[0] + abs(value - limits[0])
         value = limits[1] - abs(limits[1] - value)
         begin = end
     return target
@@ -181,7 +202,9 @@ def _as_flights(commands: np.ndarray) -> np.ndarray:
 def _fly_all(
     flights: np.ndarray, vehicle: Vehicle, fault: Fault | None, winds: list[np.ndarray | None]
 ) -> np.ndarray:
-    """Runs JSBSim over flights, each with a simulator of its own, so that no flight depends on the ones before it."""
+    """Runs JSBSim over flights, each with a simulator of its own, so that no flight depends on the
+    ones before it.
+    """
     sizes = sizes_over_flight(fault)
     return np.concatenate(
         [fly(targets, vehicle, sizes, wind) for targets, wind in zip(flights, winds, strict=True)]

@@ -1,4 +1,6 @@
-"""Faults of the aircraft and their course over a flight, which the fine and the coarse simulators share."""
+"""Faults of the aircraft and their course over a flight, which the fine and the coarse simulators
+share.
+"""
 
 import numpy as np
 
@@ -26,7 +28,8 @@ SIZES = {
 | icing | lost share of the lift; drag and weight rise in proportion | 1 | grows to its size in five minutes |
 | fuel leak | fuel that the left tank loses | pounds a second | at once |
 """
-ICE_DRAG, ICE_LB = 0.05, 10_000.0
+ICE_DRAG = 0.05
+ICE_LB = 10_000.0
 """Drag coefficient and weight in pounds that ice adds, for each unit of lost lift."""
 _ICING_SAMPLES = 300
 
@@ -48,7 +51,8 @@ def sizes_over_flight(fault: Fault | None) -> dict[str, np.ndarray]:
         fault: The fault; None for nominal.
 
     Returns:
-        For each key of `SIZES` an array of shape `(UNIT_SAMPLES,)`, which is 0 before `ONSET` and for all faults but this one.
+        For each key of `SIZES` an array of shape `(UNIT_SAMPLES,)`, which is 0 before `ONSET` and
+        for all faults but this one.
     """
     sizes = {kind: np.zeros(UNIT_SAMPLES) for kind in SIZES}
     if fault is not None:

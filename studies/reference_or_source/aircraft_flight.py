@@ -1,8 +1,10 @@
-"""The aircraft's fine simulator: an Airbus A320 in JSBSim (Berndt 2004) with an autopilot, for one flight.
+"""The aircraft's fine simulator: an Airbus A320 in JSBSim (Berndt 2004) with an autopilot, for one
+flight.
 
-The autopilot follows targets of altitude and airspeed, and keeps wings and heading level. Altitude error gives a wanted climb rate;
-the wanted flight-path angle gives a pitch, and the pitch error an elevator. The airspeed error gives a throttle, with a lead for
-the climb. It flies by the readings of its sensors.
+The autopilot follows targets of altitude and airspeed, and keeps wings and heading level. Altitude
+error gives a wanted climb rate; the wanted flight-path angle gives a pitch, and the pitch error an
+elevator. The airspeed error gives a throttle, with a lead for the climb. It flies by the readings
+of its sensors.
 """
 
 import dataclasses
@@ -18,25 +20,24 @@ from studies.reference_or_source.aircraft_faults import ICE_DRAG, ICE_LB, UNIT_S
 
 CONTROLS_A_SECOND = 10
 """How often the autopilot acts; the wind changes as often."""
-MOST_CLIMB, MOST_ACCELERATION = 25.0, 0.6
-"""Largest climb rate in feet a second and acceleration in knots a second that the autopilot asks for."""
-_ALTITUDE_S, _CLIMB_S, _SEEN_S = (
-    15.0,
-    3.0,
-    1.0,
-)  # time constants: error of altitude to climb rate, its smoothing, the airspeed's smoothing
+MOST_CLIMB = 25.0
+MOST_ACCELERATION = 0.6
+"""Largest climb rate in feet a second and acceleration in knots a second that the autopilot asks
+for.
+"""
+# time constants: error of altitude to climb rate, its smoothing, the airspeed's smoothing
+_ALTITUDE_S = 15.0
+_CLIMB_S = 3.0
+_SEEN_S = 1.0
 _MOST_SPEED_ERROR = 8.0  # knots, to which the throttle answers
 _STEPS_A_CONTROL = 3  # 30 steps of the simulator a second
-_FUEL_LB, _WING_SQFT = (
-    15_000.0,
-    1_317.0,
-)  # of each tank and of the wing, as in JSBSim's description of the A320
+# of each tank and of the wing, as in JSBSim's description of the A320
+_FUEL_LB = 15_000.0
+_WING_SQFT = 1_317.0
 _DRAG_OF_SPEEDBRAKE = 0.04  # drag coefficient of the whole speed brake, which stands for other drag
 _DRAG_AT_ZERO_LIFT = 0.016
-_WINDS = (
-    (1.0, 8.0),
-    (0.8, 4.0),
-)  # standard deviation in feet a second and correlation time in seconds, along and vertical
+# standard deviation in feet a second and correlation time in seconds, along and vertical
+_WINDS = ((1.0, 8.0), (0.8, 4.0))
 
 _READ = (
     "position/h-sl-ft", "velocities/h-dot-fps", "velocities/vc-kts", "velocities/vtrue-fps", "attitude/theta-rad", "velocities/q-rad_sec",
@@ -78,11 +79,11 @@ def import_jsbsim() -> Any:
         import jsbsim
     except ImportError:
         raise InputError(
-            "Expected JSBSim, which simulates the aircraft. Received: no such package. Install it: pip install 'enhsim_tf[aircraft]'."
+            "Expected JSBSim, which simulates the aircraft. Received: no such package. Install it: "
+            "pip install 'enhsim_tf[aircraft]'."
         ) from None
-    jsbsim.FGJSBBase().debug_lvl = (
-        0  # before the first simulator, whose banner is printed at its birth
-    )
+    # before the first simulator, whose banner is printed at its birth
+    jsbsim.FGJSBBase().debug_lvl = 0
     return jsbsim
 
 
@@ -90,7 +91,8 @@ def draw_wind(rng: np.random.Generator) -> np.ndarray:
     """Draws light turbulence over one flight, first-order Gauss-Markov processes.
 
     Returns:
-        Wind along the heading and vertical wind in feet a second, shape `(UNIT_SAMPLES * CONTROLS_A_SECOND, 2)`.
+        Wind along the heading and vertical wind in feet a second, shape `(UNIT_SAMPLES *
+        CONTROLS_A_SECOND, 2)`.
     """
     from studies.common.noise_processes import first_order
 
@@ -110,14 +112,16 @@ def fly(
     """Simulates one flight, which starts trimmed at its first targets.
 
     Args:
-        targets: Altitude in feet and airspeed in knots, shape `(UNIT_SAMPLES, 2)`; each holds for the second after its sample.
+        targets: Altitude in feet and airspeed in knots, shape `(UNIT_SAMPLES, 2)`; each holds for
+            the second after its sample.
         vehicle: The aircraft.
         sizes: Size of every fault at every sample, see `sizes_over_flight`.
         wind: As `draw_wind` returns it; None for calm air.
 
     Returns:
-        Airspeed as it reads in knots, climb rate in feet a minute, pitch in degrees, N1 left and right in percent and altitude in
-        feet, shape `(UNIT_SAMPLES, 6)`. They are the state at the start of the second in which the target of the sample holds.
+        Airspeed as it reads in knots, climb rate in feet a minute, pitch in degrees, N1 left and
+        right in percent and altitude in feet, shape `(UNIT_SAMPLES, 6)`. They are the state at the
+        start of the second in which the target of the sample holds.
 
     Raises:
         InputError: If JSBSim is not installed, or cannot trim the aircraft at the first targets.
@@ -140,16 +144,17 @@ def fly(
     put_elevator, put_aileron, put_left, put_right, put_along, put_down = (
         nodes.get_node(name).set_double_value for name in _WRITTEN
     )
-    trimmed_elevator, trimmed_throttle = (
-        model["fcs/pitch-trim-cmd-norm"] / vehicle.elevator,
-        model["fcs/throttle-cmd-norm"],
-    )
-    model["fcs/pitch-trim-cmd-norm"] = (
-        0.0  # the elevator's command holds the trim, so that a fault of the elevator reaches it
-    )
-    trimmed_pitch, wanted_speed, seen_speed = pitch(), airspeed(), airspeed()
+    trimmed_elevator = model["fcs/pitch-trim-cmd-norm"] / vehicle.elevator
+    trimmed_throttle = model["fcs/throttle-cmd-norm"]
+    # the elevator's command holds the trim, so that a fault of the elevator reaches it
+    model["fcs/pitch-trim-cmd-norm"] = 0.0
+    trimmed_pitch = pitch()
+    wanted_speed = airspeed()
+    seen_speed = airspeed()
     wanted_climb = path_sum = speed_sum = 0.0
-    dt, gains, found = 1 / CONTROLS_A_SECOND, vehicle.gains, np.empty((UNIT_SAMPLES, 6))
+    dt = 1 / CONTROLS_A_SECOND
+    gains = vehicle.gains
+    found = np.empty((UNIT_SAMPLES, 6))
     winds = itertools.repeat((0.0, 0.0)) if wind is None else iter(wind.tolist())
     for sample, (target_altitude, target_speed) in enumerate(targets.tolist()):
         size = {kind: float(values[sample]) for kind, values in sizes.items()}
@@ -203,7 +208,9 @@ def _limit(value: float, most: float) -> float:
 
 
 def _trimmed(altitude_ft: float, airspeed_kt: float, vehicle: Vehicle) -> Any:
-    """Returns a simulator of its own, so that flights are independent, that is trimmed for level flight to the north."""
+    """Returns a simulator of its own, so that flights are independent, that is trimmed for level
+    flight to the north.
+    """
     jsbsim = import_jsbsim()
     model = jsbsim.FGFDMExec(None)
     model.set_debug_level(0)
@@ -231,7 +238,8 @@ def _trimmed(altitude_ft: float, airspeed_kt: float, vehicle: Vehicle) -> Any:
         model["simulation/do_simple_trim"] = 1
     except jsbsim.TrimFailureError:
         raise InputError(
-            f"Expected first targets at which an A320 flies level. Received: {altitude_ft:.0f} ft and {airspeed_kt:.0f} kt. Change them."
+            f"Expected first targets at which an A320 flies level. Received: {altitude_ft:.0f} ft "
+            f"and {airspeed_kt:.0f} kt. Change them."
         ) from None
     return model
 

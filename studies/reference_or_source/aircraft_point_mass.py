@@ -1,7 +1,9 @@
-"""The aircraft's crude coarse simulator: a point mass with textbook constants, which an engineer could write in an afternoon.
+"""The aircraft's crude coarse simulator: a point mass with textbook constants, which an engineer
+could write in an afternoon.
 
-Climb rate and airspeed follow their targets with first-order lags. The thrust is what the sum of forces asks for, at a parabolic drag
-polar and a constant lift slope, and N1 follows it with a lag. Its constants are those of textbooks, unless they are fitted to telemetry.
+Climb rate and airspeed follow their targets with first-order lags. The thrust is what the sum of
+forces asks for, at a parabolic drag polar and a constant lift slope, and N1 follows it with a lag.
+Its constants are those of textbooks, unless they are fitted to telemetry.
 """
 
 import dataclasses
@@ -32,19 +34,19 @@ class Constants:
 
 MOST_CLIMB = 2_000 / 60
 """Largest climb rate, in feet a second."""
-_WEIGHT_LB, _WING_SQFT, _ASPECT_RATIO = 141_000.0, 1_317.0, 9.4
+_WEIGHT_LB = 141_000.0
+_WING_SQFT = 1_317.0
+_ASPECT_RATIO = 9.4
 _SPAN_EFFICIENCY = 0.8
 _LIFT_SLOPE = 2 * np.pi * _ASPECT_RATIO / (_ASPECT_RATIO + 2)  # per radian, of an elliptic wing
 _ZERO_LIFT_PITCH = np.deg2rad(-2.0)
-_THRUST_LB, _IDLE_N1 = (
-    50_000.0,
-    30.0,
-)  # both engines at sea level; thrust goes with the air's density and the square of the throttle
-_GRAVITY, _KNOT, _AIR = (
-    32.174,
-    1.6878,
-    0.0023769,
-)  # feet a second squared; feet a second; slugs a cubic foot at sea level
+# both engines at sea level; thrust goes with the air's density and the square of the throttle
+_THRUST_LB = 50_000.0
+_IDLE_N1 = 30.0
+# feet a second squared; feet a second; slugs a cubic foot at sea level
+_GRAVITY = 32.174
+_KNOT = 1.6878
+_AIR = 0.0023769
 
 
 def simulate(
@@ -57,7 +59,8 @@ def simulate(
 
     Args:
         targets: Altitude in feet and airspeed in knots, shape `(flights, UNIT_SAMPLES, 2)`.
-        sizes: Size of every fault at every sample of a flight, see `sizes_over_flight`; the elevator's is ignored.
+        sizes: Size of every fault at every sample of a flight, see `sizes_over_flight`; the
+            elevator's is ignored.
         has_climb_lag: Whether the climb rate follows the wanted one with a lag, or at once.
         constants: Its constants.
 
@@ -68,18 +71,16 @@ def simulate(
     keeps_climb, keeps_speed, keeps_engine = np.exp(-1 / lags) * [has_climb_lag, 1, 1]
     leaked = np.cumsum(sizes["fuel leak"])
     altitude, airspeed = targets[:, 0].T.astype(float)
-    climb, change, engines, found = (
-        np.zeros(len(targets)),
-        np.zeros(len(targets)),
-        None,
-        np.empty((*targets.shape[:2], 6)),
-    )
+    climb = np.zeros(len(targets))
+    change = np.zeros(len(targets))
+    engines = None
+    found = np.empty((*targets.shape[:2], 6))
     for sample in range(UNIT_SAMPLES):
-        pitot, ice = sizes["pitot"][sample], sizes["icing"][sample]
+        pitot = sizes["pitot"][sample]
+        ice = sizes["icing"][sample]
         weight = _WEIGHT_LB - leaked[sample] + ice * ICE_LB
-        density = (
-            1 - 6.8756e-6 * altitude
-        ) ** 4.2559  # as a share of that at sea level, in the standard atmosphere
+        # as a share of that at sea level, in the standard atmosphere
+        density = (1 - 6.8756e-6 * altitude) ** 4.2559
         pressure = 0.5 * _AIR * (airspeed * _KNOT) ** 2 * _WING_SQFT  # dynamic pressure and wing
         path = climb / (airspeed * _KNOT / np.sqrt(density))
         lift = weight / pressure

@@ -1,4 +1,6 @@
-"""The battery of a satellite as a system of the study: three channels, driven by a known load, with coarse simulators from exact to crude."""
+"""The battery of a satellite as a system of the study: three channels, driven by a known load, with
+coarse simulators from exact to crude.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,55 +16,51 @@ from studies.battery.faults import (
     Fault,
     measure,
 )
-from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, draw_load
+from studies.battery.orbits import (
+    INTERVAL_S,
+    ORBIT_SAMPLES,
+    REGIMES,
+    battery_current,
+    draw_load,
+)
 from studies.battery.simulate import COARSE, VEHICLE, Model, import_pybamm, simulate_all
 
-SENSOR_NOISE_A, SENSOR_STEP_A = 0.02, 20.0 / 4096
-"""Standard deviation of the current sensor's noise in amperes, and its resolution: 12 bits over 20 A."""
-
-
-def off_by(share: float) -> Model:
-    """The single-particle model of the true vehicle with each of its parameters wrong by a share, the capacity by a third of it."""
-    kept = (1 - VEHICLE.lost_material) * (1 - share / 3)
-    return Model(
-        "SPM",
-        resistance=VEHICLE.resistance * (1 + share),
-        lost_material=1 - kept,
-        lost_heat_transfer=1 - (1 - VEHICLE.lost_heat_transfer) * (1 - share),
-        diffusion=VEHICLE.diffusion * (1 - share),
-        follows_ambient=True,
-    )
+SENSOR_NOISE_A = 0.02
+SENSOR_STEP_A = 20.0 / 4096
+"""Standard deviation of the current sensor's noise in amperes, and its resolution: 12 bits over 20
+A.
+"""
 
 
 class Battery:
     """A battery over low orbits, in the gentle regime of `studies.battery`.
 
-    Commands are the load in amperes. Telemetry has the voltage in volts, the current in amperes and the temperature in degrees Celsius. A run
-    is continuous; an orbit before it, in which the battery reaches its usual temperature, is left out.
+    Commands are the load in amperes. Telemetry has the voltage in volts, the current in amperes and
+    the temperature in degrees Celsius. A run is continuous; an orbit before it, in which the
+    battery reaches its usual temperature, is left out.
     """
 
     name = "battery"
+    is_continuous = True
+    """Whether a run goes on from unit to unit."""
     channels = ("voltage", "current", "temperature")
     interval_s = INTERVAL_S
-    unit_samples, window = ORBIT_SAMPLES, 100
+    unit_samples = ORBIT_SAMPLES
+    window = 100
     onset = 0
     """First sample of each unit of a run under a fault from which the fault acts."""
-    simulators = {
-        "own": VEHICLE,
-        "off 10 %": off_by(0.1),
-        "off 30 %": off_by(0.3),
-        "wrong physics": COARSE,
-        "missing state": dataclasses.replace(COARSE, is_isothermal=True),
-    }
+    simulators = {"wrong physics": COARSE}
     faults = ALL
     parameters = ("resistance", "lost_material", "lost_heat_transfer")
-    """Parameters of the simulator with wrong physics that can be fitted to telemetry, all 0 in the published model."""
-    first_values, steps, bounds = (
-        np.zeros(3),
-        np.array([0.01, 0.05, 0.3]),
-        ((-1e-9, -1e-9, -3.0), (5.0, 4.0, 3.0)),
-    )
-    """Published values of `parameters`, the unit of each in the fit, and the limits in these units."""
+    """Parameters of the simulator with wrong physics that can be fitted to telemetry, all 0 in the
+    published model.
+    """
+    first_values = np.zeros(3)
+    steps = np.array([0.01, 0.05, 0.3])
+    bounds = ((-1e-9, -1e-9, -3.0), (5.0, 4.0, 3.0))
+    """Published values of `parameters`, the unit of each in the fit, and the limits in these
+    units.
+    """
 
     check_installed = staticmethod(import_pybamm)
 
@@ -70,16 +68,24 @@ class Battery:
         """Draws the load of so many orbits and one before them, shape `(samples, 1)`."""
         return draw_load(num_units + 1, REGIMES["gentle"], rng)[:, None]
 
+    def as_inputs(self, commands: np.ndarray) -> np.ndarray:
+        """The planned current of the battery in amperes, shape `(samples, 1)`, with the first
+        orbit.
+        """
+        return battery_current(commands[:, 0], REGIMES["gentle"])[:, None]
+
     def run_real(
         self,
         commands: np.ndarray,
         faults: Sequence[Fault | None] = (None,),
         rng: np.random.Generator | None = None,
     ) -> list[np.ndarray]:
-        """Runs the fine simulator, see `Aircraft.run_real`; the load is all that moves a battery, so that nothing is drawn.
+        """Runs the fine simulator, see `Aircraft.run_real`; the load is all that moves a battery,
+        so that nothing is drawn.
 
         Returns:
-            For each fault, which acts from the beginning of the run, float32 array of shape `(samples, 3)`, without the first orbit.
+            For each fault, which acts from the beginning of the run, float32 array of shape
+            `(samples, 3)`, without the first orbit.
         """
         return self._run(VEHICLE, commands, faults)
 
@@ -90,12 +96,15 @@ class Battery:
         faults: Sequence[Fault | None] = (None,),
         values: Sequence[float] | None = None,
     ) -> list[np.ndarray]:
-        """Runs a coarse simulator, see `Aircraft.run_coarse`; `values` are those of `parameters`, None those of the simulator.
+        """Runs a coarse simulator, see `Aircraft.run_coarse`; `values` are those of `parameters`,
+        None those of the simulator.
 
         Returns:
-            For each fault, float32 array of shape `(samples, 4)`: the channels and the load, without the first orbit.
+            For each fault, float32 array of shape `(samples, 4)`: the channels and the load,
+            without the first orbit.
         """
-        model, load = self.simulators[simulator], commands[ORBIT_SAMPLES:].astype(np.float32)
+        model = self.simulators[simulator]
+        load = commands[ORBIT_SAMPLES:].astype(np.float32)
         if values is not None:
             model = dataclasses.replace(
                 model, **dict(zip(self.parameters, map(float, values), strict=True))
@@ -108,18 +117,14 @@ class Battery:
         found = simulate_all(commands[:, 0], REGIMES["gentle"], faults, [model])
         return [runs[0][ORBIT_SAMPLES:] for runs in found]
 
-    def can_simulate(self, simulator: str, kind: str) -> bool:
-        """Whether a coarse simulator can express a kind of fault: heat transfer means nothing without a temperature."""
-        return not (self.simulators[simulator].is_isothermal and kind == "poor heat transfer")
-
     def measure(
         self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0
     ) -> np.ndarray:
-        """Measures simulated channels of shape `(samples, 3)` with sensors whose noise is multiplied by `scale`; returns float32."""
-        noise, step = (
-            (SENSOR_NOISE_V, SENSOR_NOISE_A, SENSOR_NOISE_C),
-            (SENSOR_STEP_V, SENSOR_STEP_A, SENSOR_STEP_C),
-        )
+        """Measures simulated channels of shape `(samples, 3)` with sensors whose noise is
+        multiplied by `scale`; returns float32.
+        """
+        noise = (SENSOR_NOISE_V, SENSOR_NOISE_A, SENSOR_NOISE_C)
+        step = (SENSOR_STEP_V, SENSOR_STEP_A, SENSOR_STEP_C)
         return np.stack(
             [measure(values[:, each], scale * noise[each], step[each], rng) for each in range(3)],
             axis=1,

@@ -1,11 +1,14 @@
-"""Writes the small recorded pair of an aircraft: `python -m studies.reference_or_source.example examples/aircraft`.
+"""Writes the small recorded pair of an aircraft: `python -m studies.reference_or_source.example
+examples/aircraft`.
 
-The files need no JSBSim to be read. Times count seconds; nominal flights of 20 minutes begin an hour apart.
+The files need no JSBSim to be read. Times count seconds; nominal flights of 20 minutes begin an
+hour apart.
 
-    telemetry.csv        the fine simulator through noisy sensors: what the aircraft's recorder would keep
-    simulator.csv        the point mass over the same flights: its channels, and the commands that drive it
-    telemetry_fault.csv  another flight, whose left engine answers its throttle 5 % too little after five minutes
-    simulator_planned.csv  the point mass over that flight as planned: an operator does not know of the fault
+    telemetry.csv        the fine simulator through noisy sensors: what the aircraft's recorder
+    would keep simulator.csv        the point mass over the same flights: its channels, and the
+    commands that drive it telemetry_fault.csv  another flight, whose left engine answers its
+    throttle 5 % too little after five minutes simulator_planned.csv  the point mass over that
+    flight as planned: an operator does not know of the fault
 """
 
 import sys
@@ -39,7 +42,8 @@ def tables(seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> dict[str, pd.Dat
     Raises:
         InputError: If JSBSim is not installed.
     """
-    aircraft, found = Aircraft(), {}
+    aircraft = Aircraft()
+    found = {}
     for part, (number, fault) in enumerate(((num_flights, None), (1, FAULT))):
         rng = np.random.default_rng([seed, part])
         commands = aircraft.draw_commands(number, rng)

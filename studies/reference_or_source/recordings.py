@@ -1,4 +1,6 @@
-"""The runs of a system that one seed works with: nominal and under faults, of the real system and of every coarse simulator."""
+"""The runs of a simulated system that one seed works with: nominal and under faults, of the real
+system and of the coarse simulator, as published and fitted.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,10 +13,10 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.stages import save_arrays
 
 FITTED = "fitted physics"
-"""The simulator with wrong physics after a few of its parameters were fitted to telemetry by least squares."""
+"""The simulator with wrong physics after a few of its parameters were fitted to telemetry by least
+squares.
+"""
 CRUDE = "wrong physics"
-COMMANDS = "commands only"
-"""No simulator: the commands alone are what an enhancer maps to telemetry."""
 _PARTS = ("fit", "test", "source")
 
 
@@ -25,60 +27,49 @@ def record(
 
     Args:
         system: A system, `aircraft.Aircraft` or `battery.Battery`.
-        counts: Number of units of `fit`, `test`, `source`, of the telemetry that parameters are fitted to (`parameters`), and of a run
-            under each fault (`fault`).
+        counts: Number of units of `fit`, `test`, `source`, of the telemetry that parameters are
+            fitted to (`parameters`), and of a run under each fault (`fault`).
         seed: Seed of the commands.
         folder: An existing folder.
         progress: Reports the progress.
     """
     arrays: dict[str, np.ndarray] = {}
-    commands = {
-        part: _commands(system, counts[part], seed, number) for number, part in enumerate(_PARTS)
-    }
-    kinds = list(dict.fromkeys(fault.kind for fault in system.faults))
-    told = progress.loop("runs", 1 + len(system.simulators))
+    commands = {part: commands_of(system, part, counts[part], seed) for part in _PARTS}
     for number, part in enumerate(("fit", "test")):
         (arrays[f"{part}/real"],) = system.run_real(
             commands[part], rng=np.random.default_rng([seed, 60, number])
         )
-    faulty = {
-        kind: (_commands(system, counts["fault"], seed, 10 + number), _of_kind(system, kind))
-        for number, kind in enumerate(kinds)
-    }
-    simulated = {
-        kind: (_commands(system, counts["fault"], seed, 30 + number), _of_kind(system, kind))
-        for number, kind in enumerate(kinds)
-    }
-    for number, (given, faults) in enumerate(faulty.values()):
-        for fault, run in zip(
-            faults,
-            system.run_real(given, faults, np.random.default_rng([seed, 61, number])),
-            strict=True,
-        ):
+    kinds = kinds_of(system)
+    told = progress.loop("kinds of faults", len(kinds))
+    for number, kind in enumerate(kinds):
+        commands[kind] = commands_of(system, kind, counts["fault"], seed)
+        faults = [fault for fault in system.faults if fault.kind == kind]
+        rng = np.random.default_rng([seed, 61, number])
+        for fault, run in zip(faults, system.run_real(commands[kind], faults, rng), strict=True):
             arrays[f"{key_of(fault)}/real"] = run
-    told(1)
+        told(number + 1)
     # commands are drawn unit by unit, so that the first ones are those of `fit`
     few = counts["parameters"] * system.unit_samples
     measured = system.measure(arrays["fit/real"][:few], np.random.default_rng([seed, 50]))
-    values = fit_parameters(system, _commands(system, counts["parameters"], seed, 0), measured)
-    for number, simulator in enumerate((*system.simulators, FITTED), 1):
-        name, given_values = (CRUDE, values) if simulator == FITTED else (simulator, None)
-        for part in _PARTS:
-            arrays[f"{part}/{simulator}"] = system.run_coarse(
-                name, commands[part], values=given_values
-            )[0]
-        for kind in kinds:
-            planned = system.run_coarse(name, faulty[kind][0], values=given_values)[0]
-            given, faults = simulated[kind]
-            able = system.can_simulate(name, kind)
-            runs = system.run_coarse(name, given, [None, *faults] if able else [None], given_values)
-            for place, fault in enumerate(faults, 1):
-                arrays[f"{key_of(fault)}/{simulator}"] = planned
-                if able:
-                    arrays[f"{key_of(fault)}/{simulator}/simulated"] = runs[place]
-            arrays[f"{kind}/{simulator}/nominal"] = runs[0]
-        told(min(1 + number, 1 + len(system.simulators)))
+    values = fit_parameters(
+        system, commands_of(system, "fit", counts["parameters"], seed), measured
+    )
+    for part, given in commands.items():
+        arrays[f"{part}/{CRUDE}"] = system.run_coarse(CRUDE, given)[0]
+        arrays[f"{part}/{FITTED}"] = system.run_coarse(CRUDE, given, values=values)[0]
     save_arrays(folder, arrays, "runs")
+
+
+def commands_of(system: Any, part: str, num_units: int, seed: int) -> np.ndarray:
+    """Draws the commands of a part of the runs: `fit`, `test`, `source` or a kind of fault."""
+    streams = {name: number for number, name in enumerate(_PARTS)}
+    streams |= {kind: 10 + number for number, kind in enumerate(kinds_of(system))}
+    return system.draw_commands(num_units, np.random.default_rng([seed, streams[part]]))
+
+
+def kinds_of(system: Any) -> list[str]:
+    """The kinds of faults of a system."""
+    return list(dict.fromkeys(fault.kind for fault in system.faults))
 
 
 def key_of(fault: Any) -> str:
@@ -87,17 +78,19 @@ def key_of(fault: Any) -> str:
 
 
 def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> np.ndarray:
-    """Fits the parameters of the simulator with wrong physics by least squares, as an engineer without networks would.
+    """Fits the parameters of the simulator with wrong physics by least squares, as an engineer
+    without networks would.
 
     Returns:
-        The values of `system.parameters` that lead from the commands to telemetry of shape `(samples, channels)`.
+        The values of `system.parameters` that lead from the commands to telemetry of shape
+        `(samples, channels)`.
     """
-    scale, number = telemetry.std(axis=0), telemetry.shape[1]
+    scale = telemetry.std(axis=0)
+    number = telemetry.shape[1]
 
     def values(moved: np.ndarray) -> np.ndarray:
-        return (
-            system.first_values + (moved - 1) * system.steps
-        )  # from 1, since the steps of the derivative are relative
+        # from 1, since the steps of the derivative are relative
+        return system.first_values + (moved - 1) * system.steps
 
     def errors(moved: np.ndarray) -> np.ndarray:
         run = system.run_coarse(CRUDE, commands, values=values(moved))[0]
@@ -110,11 +103,3 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
             errors, np.ones(len(system.parameters)), diff_step=0.1, max_nfev=15, bounds=bounds
         ).x
     )
-
-
-def _commands(system: Any, number: int, seed: int, stream: int) -> np.ndarray:
-    return system.draw_commands(number, np.random.default_rng([seed, stream]))
-
-
-def _of_kind(system: Any, kind: str) -> list[Any]:
-    return [fault for fault in system.faults if fault.kind == kind]

@@ -1,4 +1,6 @@
-"""`python -m studies.robustness`: detectors trained with each kind of noise, over seeds and environments."""
+"""`python -m studies.robustness`: detectors trained with each kind of noise, over seeds and
+environments.
+"""
 
 import argparse
 import sys
@@ -10,7 +12,9 @@ from studies.common.noise_processes import NOISES
 
 
 def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]:
-    """Runs the study and returns its findings; degraded modes are tested with the first kind of noise."""
+    """Runs the study and returns its findings; degraded modes are tested with the first kind of
+    noise.
+    """
     from studies.common.replicates import run_study
     from studies.robustness.degraded_modes import DegradedModes
     from studies.robustness.replicate import Replicate

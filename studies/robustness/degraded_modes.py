@@ -1,4 +1,5 @@
-"""The test of degraded modes (claim C9): errors of enhancers and simple methods on faults, inside and outside the severities of training.
+"""The test of degraded modes (claim C9): errors of enhancers and simple methods on faults, inside
+and outside the severities of training.
 
 The true degraded signal of the example is known, so every method is compared with it.
 """
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse.degraded import Degraded
 from enhsim_tf.enhancer.candidates import Training
 from enhsim_tf.enhancer.names import RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
@@ -43,12 +44,16 @@ class DegradedModes:
     """
 
     def __init__(self, replicate: Replicate):
-        self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
+        self.replicate = replicate
+        self.settings = replicate.settings
+        self.stages = replicate.stages
         self.example = replicate.example
 
     @functools.cached_property
     def table(self) -> "pd.DataFrame":
-        """The error of each method, mode and severity, in standard deviations of the nominal signal."""
+        """The error of each method, mode and severity, in standard deviations of the nominal
+        signal.
+        """
         import pandas as pd
 
         _ = self.example.enhancer_folder
@@ -63,7 +68,8 @@ class DegradedModes:
 
         methods = self._methods()
         unit = float(np.std(self._pairs(None, self.settings.modes.num_windows, "unit")[1]))
-        cells, told = [], self.stages.progress.loop("mode and severity", len(TRIED))
+        cells = []
+        told = self.stages.progress.loop("mode and severity", len(TRIED))
         for done, (mode, severity) in enumerate(TRIED, 1):
             coarse, truth = self._test_pairs(mode, severity)
             for method, estimate in methods.items():
@@ -82,14 +88,15 @@ class DegradedModes:
     def _pairs(
         self, scenario: Degraded | None, num_windows: int, purpose: str
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Coarse windows in a mode, and the true noiseless signal at the same times and with the same draws."""
-        chosen, chance = self.settings.paper, int(self.example.draw(purpose).integers(2**31))
+        """Coarse windows in a mode, and the true noiseless signal at the same times and with the
+        same draws.
+        """
+        chosen = self.settings.paper
+        chance = int(self.example.draw(purpose).integers(2**31))
         begins = np.random.default_rng(chance).integers(0, 10**6, num_windows)
         times = chosen.interval * (begins[:, None] + np.arange(chosen.window, dtype=np.float64))
-        size, shortest = (
-            chosen.orbit_amplitude + chosen.rotation_amplitude,
-            min(chosen.orbit_period, chosen.rotation_period),
-        )
+        size = chosen.orbit_amplitude + chosen.rotation_amplitude
+        shortest = min(chosen.orbit_period, chosen.rotation_period)
         coarse = self.example.coarse.simulate(times, scenario, np.random.default_rng(chance + 1))
         if scenario is None:
             return coarse, self.example.truth(times).astype(np.float32)
@@ -104,13 +111,17 @@ class DegradedModes:
         return coarse, truth.astype(np.float32)
 
     def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coarse and noisy true windows of random configurations: one seventh nominal, the others degraded."""
-        chosen, draws = self.settings, self.example.draw("configurations")
+        """Coarse and noisy true windows of random configurations: one seventh nominal, the others
+        degraded.
+        """
+        chosen = self.settings
+        draws = self.example.draw("configurations")
         per_configuration = chosen.modes.windows_per_configuration
         parts = []
         for number in range(chosen.modes.num_learnt // per_configuration):
             mode = (None, *MODES)[number % (1 + len(MODES))]
-            severity, onset = draws.uniform(0, LARGEST_TRAINED), draws.uniform(0, 0.75)
+            severity = draws.uniform(0, LARGEST_TRAINED)
+            onset = draws.uniform(0, 0.75)
             scenario = None if mode is None else Degraded(mode, severity, onset)
             parts.append(self._pairs(scenario, per_configuration, f"configuration {number}"))
         coarse, truth = (np.concatenate(each) for each in zip(*parts, strict=True))
@@ -120,9 +131,8 @@ class DegradedModes:
     def _methods(self) -> dict[str, Estimate]:
         nominal = self.example.windows("train", self.settings.paper.num_windows, "training windows")
         coarse, target = self._randomised_pairs()
-        starts = coarse.shape[1] * np.arange(
-            len(coarse)
-        )  # windows of one configuration are neighbours, and stay in one block
+        # windows of one configuration are neighbours, and stay in one block
+        starts = coarse.shape[1] * np.arange(len(coarse))
 
         def learnt_on_faults(name: str) -> Estimate:
             enhancer = Training(coarse[:, :, None], target[:, :, None], starts).fit(

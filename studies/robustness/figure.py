@@ -42,8 +42,10 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
         DOUBLE,
         1.3 + 1.7 * -(-len(found["environments"]) // 2),
         "Of simulated training data, only residual windows keep false alarms low",
-        "False alarms on real nominal windows. Signals without noise (grey, blue), with the paper's GAN (orange), with residual windows (green), "
-        "real telemetry (black). Large mark, bar: mean of seven detectors, 95 % interval. Small marks: each detector.",
+        "False alarms on real nominal windows. Signals without noise (grey, blue), with the "
+        "paper's GAN (orange), with residual windows (green), "
+        "real telemetry (black). Large mark, bar: mean of seven detectors, 95 % interval. Small "
+        "marks: each detector.",
     )
     environments = found["environments"]
     columns = min(2, len(environments))
@@ -76,11 +78,13 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
 
 
 def _row(axes: Axes, height: float, about: Mapping[str, Any], colour: str, marker: str) -> None:
-    mean, low, high = (max(about["false_alarms"][key], _LEAST) for key in ("mean", "low", "high"))
+    rates = about["false_alarms"]
     each = np.maximum(list(about["detectors"].values()), _LEAST)
     axes.plot(each, np.full(len(each), height), "|", color=colour, markersize=5, alpha=0.75)
-    axes.plot([low, high], [height] * 2, color=colour, linewidth=2.2, alpha=0.45)
-    axes.plot(mean, height, marker, color=colour, markersize=4)
+    if rates["low"] is not None:  # one seed has no interval
+        interval = np.maximum([rates["low"], rates["high"]], _LEAST)
+        axes.plot(interval, [height] * 2, color=colour, linewidth=2.2, alpha=0.45)
+    axes.plot(max(rates["mean"], _LEAST), height, marker, color=colour, markersize=4)
 
 
 _METHODS = {
@@ -97,8 +101,10 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
         DOUBLE,
         3.9,
         "Except with friction, both enhancers trained on faults beat the paper's network",
-        "Root-mean-square error with respect to the true degraded signal, in standard deviations of the nominal signal; means over seeds. "
-        "“On faults”: trained on random configurations of all modes, with severities in the grey area.",
+        "Root-mean-square error with respect to the true degraded signal, in standard deviations "
+        "of the nominal signal; means over seeds. "
+        "“On faults”: trained on random configurations of all modes, with severities in the grey "
+        "area.",
     )
     curves = found["modes"]["by_mode"]
     modes = [mode for mode in curves["paper"] if mode != "nominal"]
@@ -131,15 +137,19 @@ FIGURES: dict[str, Figure] = {
     "false_alarms": Figure(
         1,
         "False alarms by training data",
-        "A panel for each kind of noise. Six kinds of training data from top to bottom, the false-alarm rate on a logarithmic "
-        "axis: a mark with an interval for the mean over detectors, a small mark for each detector, and a line at one per cent.",
+        "A panel for each kind of noise. Six kinds of training data from top to bottom, the "
+        "false-alarm rate on a logarithmic "
+        "axis: a mark with an interval for the mean over detectors, a small mark for each "
+        "detector, and a line at one per cent.",
         false_alarms,
     ),
     "degraded_modes": Figure(
         2,
         "Error in degraded modes",
-        "Six panels, one for each degraded mode: error against severity for the coarse signal, the paper's enhancer, and ridge regression "
-        "without and with random features, trained on faults; the severities of training are shaded.",
+        "Six panels, one for each degraded mode: error against severity for the coarse signal, the "
+        "paper's enhancer, and ridge regression "
+        "without and with random features, trained on faults; the severities of training are "
+        "shaded.",
         degraded_modes,
     ),
 }

@@ -1,4 +1,6 @@
-"""One replicate of the study of robustness: a kind of noise and a seed, with all networks trained again."""
+"""One replicate of the study of robustness: a kind of noise and a seed, with all networks trained
+again.
+"""
 
 import dataclasses
 import functools
@@ -24,7 +26,10 @@ ARMS = {
     "truth": "the noiseless signal, as from a perfect simulator without environmental noise",
     "enhanced": "the signal of the paper's enhancer, without noise",
     "enhanced + GAN": "plus noise of the paper's GAN",
-    "ridge + residual windows": "ridge regression on the same windows, plus whole windows of what it leaves of the telemetry",
+    "ridge + residual windows": (
+        "ridge regression on the same windows, plus whole windows of what it leaves of the "
+        "telemetry"
+    ),
     "real": "real nominal telemetry",
 }
 """Training windows of detectors."""
@@ -39,12 +44,14 @@ class Replicate:
     """One replicate of the study.
 
     Args:
-        settings: All settings; `noise` is the environment, the seed covers data, networks and detectors.
+        settings: All settings; `noise` is the environment, the seed covers data, networks and
+            detectors.
         stages: Runs stages and caches their results.
     """
 
     def __init__(self, settings: Settings, stages: Stages):
-        self.settings, self.stages = settings, stages
+        self.settings = settings
+        self.stages = stages
         self.example = Example(settings, stages)
 
     @functools.cached_property
@@ -64,8 +71,10 @@ class Replicate:
     def _make_arms(self, folder: Path) -> None:
         import pandas as pd
 
-        trial, seed = self.trial(), self.settings.seed
-        training, held_out = self.arms("arms, training"), self.arms("arms, threshold")
+        trial = self.trial()
+        seed = self.settings.seed
+        training = self.arms("arms, training")
+        held_out = self.arms("arms, threshold")
         rows: dict[str, list[dict]] = {name: [] for name in TABLES}
         told = self.stages.progress.loop("arm", len(ARMS))
         for done, arm in enumerate(ARMS, 1):
@@ -84,7 +93,8 @@ class Replicate:
         """The test data: held-out nominal windows, and the same windows with anomalies.
 
         Args:
-            num_anomalous: Anomalous windows of each kind and severity; None for the number in the settings.
+            num_anomalous: Anomalous windows of each kind and severity; None for the number in the
+                settings.
         """
         chosen = self.settings.robustness
         nominal, reference = (
@@ -103,12 +113,16 @@ class Replicate:
         """Windows of every arm.
 
         Args:
-            purpose: `arms, training` for the windows that train detectors, `arms, threshold` for those that set thresholds.
+            purpose: `arms, training` for the windows that train detectors, `arms, threshold` for
+                those that set thresholds.
         """
-        example, number = self.example, self.settings.robustness.num_windows
+        example = self.example
+        number = self.settings.robustness.num_windows
         simulated = example.windows("train", number, purpose)
-        coarse, rng = simulated["coarse"], example.draw(f"{purpose}, noise")
-        enhanced, (ridge, residuals) = example.enhance(coarse), self._without_network
+        coarse = simulated["coarse"]
+        rng = example.draw(f"{purpose}, noise")
+        enhanced = example.enhance(coarse)
+        (ridge, residuals) = self._without_network
         part = "train" if purpose == "arms, training" else "calibration"
         return {
             "coarse": coarse,
@@ -121,7 +135,9 @@ class Replicate:
 
     @functools.cached_property
     def _without_network(self) -> tuple[Ridge, WindowBootstrap]:
-        """Ridge regression on the windows from which the paper's enhancer learns, and as many windows of what it leaves."""
+        """Ridge regression on the windows from which the paper's enhancer learns, and as many
+        windows of what it leaves.
+        """
         number = self.settings.paper.num_windows
         learnt, others = (
             self.example.windows("train", number, each)

@@ -8,7 +8,7 @@ import numpy as np
 from studies.common.controls import CONTROLS
 from studies.common.detectors import DETECTORS
 from studies.common.noise_processes import NOISES
-from studies.common.statistics import mean_interval
+from studies.common.statistics import t_interval
 from studies.common.tables import KeptTables
 from studies.robustness.degraded_modes import LARGEST_TRAINED, METHODS
 from studies.robustness.replicate import ARMS
@@ -22,7 +22,9 @@ CONTRASTS = (
     ("enhanced + GAN", "ridge + residual windows"),
     ("ridge + residual windows", "real"),
 )
-"""Declared before the runs: the paper's noise against none and against drawn residuals, and these against real telemetry."""
+"""Declared before the runs: the paper's noise against none and against drawn residuals, and these
+against real telemetry.
+"""
 KEPT = KeptTables(
     ("alarms", "recall", "degraded"),
     labels=("environment", "arm", "detector", "kind", "method", "mode"),
@@ -56,7 +58,9 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
 
 
 def rates(alarms: "pd.DataFrame") -> "pd.DataFrame":
-    """False-alarm rate of each environment, seed, arm and detector, over all blocks of time: column `rate`."""
+    """False-alarm rate of each environment, seed, arm and detector, over all blocks of time: column
+    `rate`.
+    """
     counts = alarms.groupby([*REPLICATE, "arm", "detector"], as_index=False)[
         ["alarms", "windows"]
     ].sum()
@@ -71,8 +75,8 @@ def trained(table: "pd.DataFrame") -> "pd.DataFrame":
 def by_block(alarms: "pd.DataFrame") -> "pd.DataFrame":
     """Mean false-alarm rate of the trained detectors in each block of time; one column per arm.
 
-    Blocks can differ in size by one window. The alarms of each block are divided by the mean number of windows per block, so that
-    the mean over blocks is the rate of the replicate.
+    Blocks can differ in size by one window. The alarms of each block are divided by the mean number
+    of windows per block, so that the mean over blocks is the rate of the replicate.
     """
     blocks = trained(alarms)
     groups = blocks.groupby([*REPLICATE, "arm", "detector"])["windows"]
@@ -99,7 +103,7 @@ def arms(
     kept = keeps_the_rule(per_detector, recalls["recall"])
     return {
         arm: {
-            "false_alarms": _share(mean_interval(blocks[arm])),
+            "false_alarms": _share(over_seeds(blocks[arm])),
             **{name: float(recalls.loc[arm, name].mean()) for name in recalls},
             "recalls_at_real_rate": recalls.loc[arm, "recall_at_real_rate"]
             .groupby("detector")
@@ -108,7 +112,7 @@ def arms(
             "criterion": {"met": int(kept[arm].sum()), "of": len(kept)},
             "by_environment": {
                 name: {
-                    "false_alarms": _share(mean_interval(blocks[arm].xs(name), ["seed"])),
+                    "false_alarms": _share(over_seeds(blocks[arm].xs(name))),
                     "recall_at_real_rate": float(
                         recalls.loc[(arm, name), "recall_at_real_rate"].mean()
                     ),
@@ -121,23 +125,34 @@ def arms(
     }
 
 
-def _share(found: Mapping[str, float]) -> dict[str, float]:
-    """The interval of a share, limited to 1: a bootstrap sample of the larger blocks can exceed it."""
-    return {name: min(value, 1.0) for name, value in found.items()}
+def over_seeds(values: "pd.Series") -> dict[str, float | None]:
+    """The mean of a series with Student's interval over its seeds; kinds of noise are fixed."""
+    return t_interval(values.groupby("seed").mean())
+
+
+def _share(found: Mapping[str, float | None]) -> dict[str, float | None]:
+    """The interval of a share, limited to 0 and 1."""
+    return {
+        name: None if value is None else min(max(value, 0.0), 1.0) for name, value in found.items()
+    }
 
 
 def keeps_the_rule(rate: "pd.Series", recall: "pd.Series") -> "pd.DataFrame":
-    """Whether each row of rates and recalls, indexed by `arm` and more, meets the criterion of claim C8; one column per arm.
+    """Whether each row of rates and recalls, indexed by `arm` and more, meets the criterion of
+    claim C8; one column per arm.
 
-    The false-alarm rate has to be at most twice that of training on real telemetry plus one percentage point, and recall at most
-    five points lower.
+    The false-alarm rate has to be at most twice that of training on real telemetry plus one
+    percentage point, and recall at most five points lower.
     """
-    rates, recalls = rate.unstack("arm"), recall.unstack("arm")
+    rates = rate.unstack("arm")
+    recalls = recall.unstack("arm")
     return rates.le(2 * rates["real"] + 0.01, axis=0) & recalls.ge(recalls["real"] - 0.05, axis=0)
 
 
 def controls(alarms: "pd.DataFrame", recall: "pd.DataFrame") -> dict[str, Any]:
-    """False alarms and recall of scores of one line of code, with thresholds set on real windows."""
+    """False alarms and recall of scores of one line of code, with thresholds set on real
+    windows.
+    """
     rate = rates(alarms).groupby("detector")["rate"].mean()
     found = recall.groupby("detector")[["recall", "recall_at_real_rate"]].mean()
     return {
@@ -147,15 +162,17 @@ def controls(alarms: "pd.DataFrame", recall: "pd.DataFrame") -> dict[str, Any]:
 
 
 def contrasts(alarms: "pd.DataFrame") -> list[dict[str, Any]]:
-    """Differences in false alarms between arms, means over detectors: over all kinds of noise, and for each."""
+    """Differences in false alarms between arms, means over detectors: over all kinds of noise, and
+    for each.
+    """
     blocks = by_block(alarms)
     return [
         {
             "first": first,
             "second": second,
-            "difference": mean_interval(difference),
+            "difference": over_seeds(difference),
             "by_environment": {
-                name: mean_interval(difference.xs(name), ["seed"])
+                name: over_seeds(difference.xs(name))
                 for name in difference.index.unique("environment")
             },
         }
@@ -165,7 +182,9 @@ def contrasts(alarms: "pd.DataFrame") -> list[dict[str, Any]]:
 
 
 def modes(degraded: "pd.DataFrame") -> dict[str, Any]:
-    """Error of each method on nominal windows, inside and outside the severities of training, and by mode and severity."""
+    """Error of each method on nominal windows, inside and outside the severities of training, and
+    by mode and severity.
+    """
     where = np.select(
         [degraded["mode"] == "nominal", degraded["severity"] <= LARGEST_TRAINED],
         ["nominal", "inside"],

@@ -9,18 +9,26 @@ from pathlib import Path
 import pytest
 
 from enhsim_tf.common import atomic_files
-from enhsim_tf.common.atomic_files import remove_leftovers, replace_file, replace_folder
+from enhsim_tf.common.atomic_files import (
+    remove_leftovers,
+    replace_file,
+    replace_files,
+    replace_folder,
+)
 
 ROOT = Path(__file__).parents[2]
 KILLED = """
 import os, signal, sys
 from enhsim_tf.common import atomic_files
-rename = os.replace
+rename, calls = os.replace, []
 def killed(source, destination):
     rename(source, destination)
-    if str(destination).endswith(".old.enhsim_tf"):
+    calls.append(source)
+    if len(calls) == int(sys.argv[1]):
         os.kill(os.getpid(), signal.SIGKILL)
+os.replace = killed
 """
+"""A process that is killed after so many renames."""
 
 
 def content_of(folder):
@@ -35,16 +43,37 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def killed(path, what, moment):
-    """Writes a file or a folder in a process that is killed while it writes, or between the two renames of a folder."""
-    script = KILLED + ("os.replace = killed\n" if moment == "between the renames" else "")
-    script += f"""
-with atomic_files.replace_{what}(sys.argv[1]) as temporary:
+def run(script, renames, *paths):
+    """The exit code of a process that is killed after so many renames."""
+    words = [sys.executable, "-c", KILLED + script, str(renames), *map(str, paths)]
+    return subprocess.run(words, cwd=ROOT).returncode
+
+
+def killed(path, what, renames):
+    """Writes a file or a folder in a process that is killed after so many renames; after none, when
+    it has written half.
+    """
+    script = f"""
+with atomic_files.replace_{what}(sys.argv[2]) as temporary:
     (temporary / "inside" if "{what}" == "folder" else temporary).write_text("new")
-    if "{moment}" == "while writing":
+    if sys.argv[1] == "0":
         os.kill(os.getpid(), signal.SIGKILL)
 """
-    assert subprocess.run([sys.executable, "-c", script, str(path)], cwd=ROOT).returncode == -9
+    assert run(script, renames, path) == -9
+
+
+def test_a_new_folder_that_stays_empty_is_removed_and_others_are_kept(tmp_path):
+    (tmp_path / "old").mkdir()
+    with pytest.raises(ValueError), atomic_files.removing_empty(tmp_path / "old" / "a" / "b"):
+        atomic_files.make_folder(tmp_path / "old" / "a" / "b")
+        raise ValueError
+    with atomic_files.removing_empty(tmp_path / "full" / "new"):
+        atomic_files.make_folder(tmp_path / "full" / "new")
+        (tmp_path / "full" / "kept").touch()
+    with atomic_files.removing_empty(tmp_path / "old"):
+        pass
+    assert content_of(tmp_path) == {"full/kept": ""}
+    assert names_in(tmp_path) == ["full", "old"] and not names_in(tmp_path / "old")
 
 
 def test_a_folder_is_made_with_its_parents_and_refused_in_place_of_a_file(tmp_path, refused):
@@ -72,9 +101,8 @@ def test_replace_folder_replaces_whatever_is_there(tmp_path, before):
         path.symlink_to(tmp_path / "elsewhere")
     with replace_folder(path) as temporary:
         (temporary / "inside").write_text("new")
-    assert content_of(tmp_path) == {"above/model/inside": "new"} and names_in(path.parent) == [
-        "model"
-    ]
+    assert content_of(tmp_path) == {"above/model/inside": "new"}
+    assert names_in(path.parent) == ["model"]
 
 
 @pytest.mark.parametrize("what", ["file", "folder"])
@@ -89,10 +117,8 @@ def test_an_interrupt_keeps_the_old_content(tmp_path, what, before):
     with pytest.raises(KeyboardInterrupt), replace(path) as temporary:
         (temporary / "inside" if what == "folder" else temporary).write_text("half")
         raise KeyboardInterrupt
-    assert (
-        list(content_of(tmp_path).values()) == ["old"] * before
-        and len(names_in(tmp_path)) == before
-    )
+    assert list(content_of(tmp_path).values()) == ["old"] * before
+    assert len(names_in(tmp_path)) == before
 
 
 def test_a_failure_between_the_two_renames_restores_the_old_content(tmp_path, monkeypatch):
@@ -113,13 +139,13 @@ def test_a_failure_between_the_two_renames_restores_the_old_content(tmp_path, mo
 
 
 @pytest.mark.parametrize("then", ["remove_leftovers", "replace_folder"])
-@pytest.mark.parametrize("moment", ["while writing", "between the renames"])
-def test_a_kill_leaves_the_old_content(tmp_path, then, moment):
+@pytest.mark.parametrize("renames", [0, 1])  # while it writes, and between its renames
+def test_a_kill_leaves_the_old_content(tmp_path, then, renames):
     path = tmp_path / "model.v2"
     path.mkdir()
     (path / "inside").write_text("old")
-    killed(path, "folder", moment)
-    assert path.exists() == (moment == "while writing") and len(names_in(tmp_path)) > 1
+    killed(path, "folder", renames)
+    assert path.exists() == (renames == 0) and len(names_in(tmp_path)) > 1
     if then == "remove_leftovers":
         remove_leftovers(tmp_path)
     else:
@@ -130,7 +156,7 @@ def test_a_kill_leaves_the_old_content(tmp_path, then, moment):
 
 def test_files_that_a_killed_process_left_are_removed(tmp_path):
     for name in ("results.json", "without"):
-        killed(tmp_path / name, "file", "while writing")
+        killed(tmp_path / name, "file", 0)
     remove_leftovers(tmp_path, "without")
     assert {name.startswith(".results.json.") for name in names_in(tmp_path)} == {True}
     remove_leftovers(tmp_path)
@@ -158,12 +184,11 @@ def test_files_that_only_look_like_leftovers_stay(tmp_path):
 def test_replace_folder_keeps_the_old_content_if_keep_says_so(tmp_path):
     for text, expected in (("broken", "broken"), ("whole", "whole"), ("other", "whole")):
         with replace_folder(
-            tmp_path / "stage", lambda found: (found / "inside").read_text() == "whole"
+            tmp_path / "stage", lambda there: (there / "inside").read_text() == "whole"
         ) as temporary:
             (temporary / "inside").write_text(text)
-        assert content_of(tmp_path) == {"stage/inside": expected} and names_in(tmp_path) == [
-            "stage"
-        ]
+        assert content_of(tmp_path) == {"stage/inside": expected}
+        assert names_in(tmp_path) == ["stage"]
 
 
 def test_many_writers_at_once_leave_one_whole_folder(tmp_path):
@@ -188,11 +213,60 @@ def test_json_without_nan_and_its_checksum(tmp_path):
     atomic_files.write_json(path, {"a": [1, 2.5, None, "é"]})
     with pytest.raises(ValueError, match="not JSON compliant"):
         atomic_files.write_json(path, {"a": float("nan")})
-    assert json.loads(path.read_text(encoding="utf-8")) == {"a": [1, 2.5, None, "é"]} and names_in(
-        tmp_path
-    ) == ["results.json"]
+    assert json.loads(path.read_text(encoding="utf-8")) == {"a": [1, 2.5, None, "é"]}
+    assert names_in(tmp_path) == ["results.json"]
     path.write_bytes(b"abc")  # FIPS 180-2, appendix B.1
     assert (
         atomic_files.sha256(path)
         == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     )
+
+
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize("fails", ["one", "two"])
+def test_files_that_belong_together_are_replaced_together_or_not_at_all(
+    tmp_path, monkeypatch, before, fails
+):
+    paths, rename = [tmp_path / "one", tmp_path / "two"], os.replace
+    for path in paths if before else ():
+        path.write_text("old")
+    kept = content_of(tmp_path)
+
+    def failing(source, destination):
+        if Path(destination).name == fails and Path(source).read_text() == "new":
+            raise OSError("no space left")
+        rename(source, destination)
+
+    monkeypatch.setattr(atomic_files.os, "replace", failing)
+
+    def replace():
+        with replace_files(*paths) as temporaries:
+            for temporary in temporaries:
+                temporary.write_text("new")
+
+    with pytest.raises(OSError, match="no space left"):
+        replace()
+    assert content_of(tmp_path) == kept
+    monkeypatch.undo()
+    replace()
+    assert content_of(tmp_path) == {"one": "new", "two": "new"}
+
+
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize("renames", range(1, 6))
+def test_a_kill_between_renames_leaves_all_old_files_or_all_new_ones(tmp_path, before, renames):
+    paths = [tmp_path / "one", tmp_path / "two"]
+    for path in paths if before else ():
+        path.write_text("old")
+    script = """
+with atomic_files.replace_files(*sys.argv[2:]) as temporaries:
+    for temporary in temporaries:
+        temporary.write_text("new")
+"""
+    # the list of what is to be undone is the first rename; each old file takes one more
+    is_done = renames > 1 + 2 * (1 + before)
+    assert run(script, renames, *paths) == (0 if is_done else -9)
+    remove_leftovers(tmp_path)
+    old = {"one": "old", "two": "old"} if before else {}
+    assert content_of(tmp_path) == ({"one": "new", "two": "new"} if is_done else old)
+    assert names_in(tmp_path) == sorted(content_of(tmp_path))

@@ -1,4 +1,6 @@
-"""The start of TensorFlow: default settings, settings of the user, and the output on the terminal."""
+"""The start of TensorFlow: default settings, settings of the user, and the output on the
+terminal.
+"""
 
 import os
 import subprocess
@@ -10,7 +12,10 @@ import pytest
 ROOT = Path(__file__).parents[2]
 START = "from enhsim_tf.common.backend import keras, tf\n"
 # whether oneDNN's kernels are on, as TensorFlow itself says
-STATE = "from tensorflow.python.util import _pywrap_util_port as port\nprint(port.IsMklEnabled(), keras.backend.backend(), sep=',')\n"
+STATE = (
+    "from tensorflow.python.util import _pywrap_util_port as port\nprint(port.IsMklEnabled(), "
+    "keras.backend.backend(), sep=',')\n"
+)
 
 
 def run(code, **environment):
@@ -27,14 +32,10 @@ def run(code, **environment):
 
 
 def test_it_starts_without_a_message_and_gives_standard_error_back():
-    ended = run(
-        START + STATE + "import os, sys\nprint('heard', file=sys.stderr)\nos.write(2, b'again')"
-    )
-    assert (ended.stdout, ended.stderr, ended.returncode) == (
-        "True,tensorflow\n",
-        "heard\nagain",
-        0,
-    )
+    code = "import os, sys\nprint('heard', file=sys.stderr)\nos.write(2, b'again')"
+    done = run(START + STATE + code)
+    assert (done.returncode, done.stdout) == (0, "True,tensorflow\n")
+    assert done.stderr == "heard\nagain"
 
 
 @pytest.mark.slow
@@ -43,7 +44,10 @@ def test_the_users_choice_of_kernels_wins(value, is_on):
     assert run(START + STATE, TF_ENABLE_ONEDNN_OPTS=value).stdout == f"{is_on},tensorflow\n"
 
 
-REFUSED = "from enhsim_tf.common.errors import InputError\ntry:\n    import enhsim_tf.common.backend\nexcept InputError as error:\n    print(error)"
+REFUSED = (
+    "from enhsim_tf.common.errors import InputError\ntry:\n    import "
+    "enhsim_tf.common.backend\nexcept InputError as error:\n    print(error)"
+)
 
 
 def test_another_backend_of_keras_is_refused():
@@ -63,7 +67,8 @@ def test_tensorflow_that_runs_already_keeps_its_settings():
     assert run(code, TF_ENABLE_ONEDNN_OPTS="0").stdout == "True\nFalse,tensorflow\n"
 
 
-# Allocates and frees 40 MB as TensorFlow does for the gradient of the widest layer, and counts the pages that came anew.
+# Allocates and frees 40 MB as TensorFlow does for the gradient of the widest layer, and counts the
+# pages that came anew.
 FAULTS = """
 import ctypes, resource
 import enhsim_tf.common.backend

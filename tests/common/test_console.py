@@ -1,6 +1,9 @@
-"""Lines of the commands: printed at once, in characters that the terminal can encode; progress only where it was asked for."""
+"""Lines of the commands: printed at once, in characters that the terminal can encode; progress only
+where it was asked for.
+"""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -8,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from enhsim_tf.common.console import SILENT, Progress
-from enhsim_tf.simulator.fitting import fit
-from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.common.console import SILENT, Progress, run_command
+from enhsim_tf.fitting.fit import fit
+from enhsim_tf.fitting.options import FitOptions
 from enhsim_tf.telemetry.series import Telemetry
 
 ROOT = Path(__file__).parents[2]
@@ -21,7 +24,8 @@ ROOT = Path(__file__).parents[2]
     [("ascii", "Gr??e ?\n"), ("latin-1", "Größe ?\n"), ("utf-8", "Größe 漢\n")],
 )
 def test_a_line_is_printed_at_once_in_the_characters_of_the_encoding(encoding, printed):
-    script = "import os\nfrom enhsim_tf.common.console import tell\ntell('Größe 漢')\nos._exit(0)"  # os._exit discards unwritten output
+    # os._exit discards unwritten output
+    script = "import os\nfrom enhsim_tf.common.console import tell\ntell('Größe 漢')\nos._exit(0)"
     ended = subprocess.run(
         [sys.executable, "-c", script],
         cwd=ROOT,
@@ -34,10 +38,11 @@ def test_a_line_is_printed_at_once_in_the_characters_of_the_encoding(encoding, p
 def test_a_loop_tells_how_far_it_is_at_most_every_fifteen_seconds():
     now, told = [1_000.0], []
     progress = Progress(told.append, "second ", clock=lambda: now[0])
+    # the interval spans the loops
     for unit, total, steps, seconds in (
         ("epoch", 2, [1, 1.5], 8),
         ("iteration", 10, range(1, 11), 2),
-    ):  # the interval spans the loops
+    ):
         loop = progress.loop(unit, total)
         for done in steps:
             now[0] += seconds
@@ -50,13 +55,22 @@ def test_a_loop_tells_how_far_it_is_at_most_every_fifteen_seconds():
 
 def test_a_fit_names_its_steps_where_it_is_asked_to(capsys):
     rng, told = np.random.default_rng(0), []
-    telemetry = Telemetry(
-        (np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)).astype(np.float32)
-    )
+    values = np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)
+    telemetry = Telemetry.of(values.astype(np.float32))
     options = FitOptions(window=60, num_windows=60, enhancer="ridge", noise="residual windows")
     for progress in (SILENT, Progress(told.append, "volts: ")):
         fit(telemetry, options=options, progress=progress)
         assert capsys.readouterr() == ("", ""), "its lines go where they were asked for"
     assert told == [
-        f"volts: {step} ..." for step in ("enhancer coarse", "enhancer ridge", "noise", "detectors")
+        f"volts: {step} ..." for step in ("enhancer coarse", "enhancer ridge", "noise", "report")
     ]
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_to_end_is_an_interrupt(sent, capsys):
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        code = run_command(lambda: os.kill(os.getpid(), sent) or 0, "ended")
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert code == 130 and capsys.readouterr().err == "ended\n"

@@ -1,4 +1,6 @@
-"""Reproducibility: bitwise on the same machine, and up to rounding with the instructions of another processor."""
+"""Reproducibility: bitwise on the same machine, and up to rounding with the instructions of another
+processor.
+"""
 
 import os
 import platform
@@ -10,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.model import Enhancer
 from tests.known_simulators import of_waves
 
@@ -28,35 +30,22 @@ def model(tmp_path):
         for size in ((120, 256), (256, 256), (256, 120))
     ]
     layers = tuple((kernel, np.zeros(kernel.shape[1], np.float32)) for kernel in kernels)
-    enhancer = Enhancer(
-        "network", 120, 1, 1, np.zeros(1, np.float32), np.zeros(120, np.float32), (), layers
-    )
-    of_waves(
-        [SquareWaveSimulator([SquareWave(480, low=-1.0, high=1.0)])],
-        120,
-        interval_s=2.0,
-        enhancer=enhancer,
-    ).save(folder)
+    zeros = np.zeros(1, np.float32), np.zeros(120, np.float32)
+    enhancer = Enhancer("network", 120, 1, 1, *zeros, (), layers)
+    waves = [SquareWaveSimulator([SquareWave(480, low=-1.0, high=1.0)])]
+    of_waves(waves, 120, interval_s=2.0, enhancer=enhancer).save(folder)
     return folder
 
 
 def generated(model, out, **environment):
-    """Generates a small data set with the command in a separate process, and returns its bytes and its table."""
-    command = [
-        sys.executable,
-        "-m",
-        "enhsim_tf",
-        "generate",
-        model,
-        "--windows",
-        "120",
-        "--scenario",
-        "dropout:0.7",
-        "--workers",
-        "1",
-    ]
+    """Generates a small data set with the command in a separate process, and returns its bytes and
+    its table.
+    """
+    words = (
+        f"generate {model} --windows 120 --scenario dropout:0.7 --workers 1 --seed 4 --out {out}"
+    )
     subprocess.run(
-        [*command, "--seed", "4", "--out", out],
+        [sys.executable, "-m", "enhsim_tf", *words.split()],
         cwd=ROOT,
         env=os.environ | environment,
         check=True,
@@ -77,9 +66,8 @@ def test_to_rounding_on_another(model, tmp_path):
         generated(model, tmp_path / kernels, OPENBLAS_CORETYPE=kernels) for kernels in OTHERS
     ]
     for _, table in elsewhere:
-        pd.testing.assert_frame_equal(
-            table.drop(columns="window"), here[1].drop(columns="window")
-        )  # all that is drawn is the same
+        # all that is drawn is the same
+        pd.testing.assert_frame_equal(table.drop(columns="window"), here[1].drop(columns="window"))
         first, second = (np.stack(frame["window"]) for frame in (here[1], table))
         np.testing.assert_allclose(second, first, rtol=0, atol=2e-5 * first.std())
     assert any(there != here[0] for there, _ in elsewhere), "not all of them can be what runs here"

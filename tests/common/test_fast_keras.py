@@ -1,4 +1,6 @@
-"""What is fast against plain Keras: the same values, gradients, losses and weights up to rounding, for every form of layer and batch."""
+"""What is fast against plain Keras: the same values, gradients, losses and weights up to rounding,
+for every form of layer and batch.
+"""
 
 import keras
 import numpy as np
@@ -21,9 +23,8 @@ RNG = np.random.default_rng
 
 def test_fused_adam_moves_the_weights_as_adam_does():
     start, rng = np.linspace(-1, 1, 50).astype(np.float32), RNG(1)
-    gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(
-        np.float32
-    )  # from far below epsilon upwards
+    # from far below epsilon upwards
+    gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(np.float32)
     moved = []
     for optimizer in (fused_adam(0.01), keras.optimizers.Adam(0.01)):
         weight = keras.Variable(start)
@@ -35,7 +36,7 @@ def test_fused_adam_moves_the_weights_as_adam_does():
     assert np.abs(moved[0]).max() > 0.1
 
 
-# -- Dense layers by blocks ------------------------------------------------------------------------------------------------
+# -- Dense layers by blocks ----------------------------------------------------------------------
 
 WINDOW, UNITS = 12, 20
 TARGET = RNG(0).normal(size=(80, WINDOW)).astype(np.float32)
@@ -46,9 +47,8 @@ def small_enhancer():
     return dense_stack(WINDOW, (WINDOW, UNITS, UNITS, WINDOW), seed=4, name="enhancer")
 
 
-@pytest.mark.parametrize(
-    "rows", [3, 13, 400]
-)  # of a block; none divides the 20 rows of the widest kernel, and 400 are no block
+# of a block; none divides the 20 rows of the widest kernel, and 400 are no block
+@pytest.mark.parametrize("rows", [3, 13, 400])
 @pytest.mark.parametrize(
     ("batch_size", "rate"),
     [(20, lambda: keras.optimizers.schedules.CosineDecay(0.003, 20)), (33, lambda: 0.001)],
@@ -63,9 +63,8 @@ def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
     orders, losses = RNG(3), []
     for _ in range(3):
         order = orders.permutation(len(SOURCE))
-        losses += plain.fit(
-            SOURCE[order], TARGET[order], batch_size, verbose=0, shuffle=False
-        ).history["loss"]
+        rows = SOURCE[order], TARGET[order]
+        losses += plain.fit(*rows, batch_size, verbose=0, shuffle=False).history["loss"]
     np.testing.assert_allclose(found, losses, rtol=3e-6)
     for weight, same, of_plain in zip(
         network.get_weights(), again.get_weights(), plain.get_weights(), strict=True
@@ -94,7 +93,7 @@ def test_only_wide_and_plain_stacks_are_cut(layers, is_wide):
     assert is_wide_dense_stack(keras.Sequential([keras.Input((1_200,)), *layers])) == is_wide
 
 
-# -- Convolution with its maximum ------------------------------------------------------------------------------------------
+# -- Convolution with its maximum ----------------------------------------------------------------
 
 SHAPES = [  # rows, samples, width, stride, filters
     (5, 63, 20, 4, 3),  # three samples that no frame reaches
@@ -111,12 +110,11 @@ def of_keras(stride, kept=None, rate=0.0):
     """Conv1D, Dropout with a given mask, and GlobalMaxPooling1D."""
 
     def compute(rows, kernel, bias):
-        products = tf.nn.relu(
-            tf.nn.conv1d(rows[:, :, None], kernel[:, None], stride, "VALID") + bias
-        )
-        return tf.reduce_max(
-            products if kept is None else tf.where(kept, products / (1 - rate), 0.0), axis=1
-        )
+        products = tf.nn.conv1d(rows[:, :, None], kernel[:, None], stride, "VALID") + bias
+        products = tf.nn.relu(products)
+        if kept is not None:
+            products = tf.where(kept, products / (1 - rate), 0.0)
+        return tf.reduce_max(products, axis=1)
 
     return compute
 
@@ -147,29 +145,19 @@ def fast_of(stride, rate=0.0, seed=None):
     return lambda rows, kernel, bias: convolution_maximum(rows, kernel, bias, stride, rate, seed)
 
 
-def test_a_convolution_by_hand():
-    # frames [1 2], [0 3], [-1 -9] times the kernel [1 1]: 3, 3, -10, so two winners share the gradient
-    inputs = [[1, 2, 0, 3, -1, -9]], [[1], [1]], [0.5]
-    value, to_rows, to_kernel, to_bias = values_and_gradients(fast_of(2), inputs, [[2]])
-    assert value.tolist() == [[3.5]] and to_rows.tolist() == [[1, 1, 1, 1, 0, 0]]
-    assert to_kernel.tolist() == [[1 * 1 + 1 * 0], [1 * 2 + 1 * 3]] and to_bias.tolist() == [2]
-
-
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
 @pytest.mark.parametrize("has_ties", [False, True])
 def test_values_and_gradients_are_those_of_keras(shape, has_ties):
     num_rows, samples, width, stride, filters = shape
-    # rows and kernels of -1, 0 and 1: many frames give the same maximum, to the bit in any order of summation
-    draw = (
-        (lambda *size: RNG(len(size)).integers(-1, 2, size))
-        if has_ties
-        else (lambda *size: RNG(len(size)).normal(size=size))
-    )
-    outputs, *_ = compare(
-        (draw(num_rows, samples), draw(width, filters), draw(filters)),
-        fast_of(stride),
-        of_keras(stride),
-    )
+
+    def draw(*size):
+        rng = RNG(len(size))
+        # rows and kernels of -1, 0 and 1: many frames give the same maximum, to the bit in any
+        # order of summation
+        return rng.integers(-1, 2, size) if has_ties else rng.normal(size=size)
+
+    inputs = draw(num_rows, samples), draw(width, filters), draw(filters)
+    outputs, *_ = compare(inputs, fast_of(stride), of_keras(stride))
     assert outputs.any()
 
 
@@ -198,22 +186,15 @@ def test_gradients_with_dropped_products(rate):
     compare(inputs, fast_of(4, rate, seed), of_keras(4, kept, rate), 2e-5 / (1 - rate))
 
 
-def small_discriminator(**changed):
-    return of_paper.build_discriminator(
-        tiny_settings(window=63, filters=14, narrow_units=5, **changed)
-    )
+SMALL = {"window": 63, "filters": 14, "narrow_units": 5}
 
 
 def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
     rows, trained = tf.constant(RNG(0).normal(0, 0.1, (16, 63, 1)), tf.float32), []
     for _ in range(2):
-        settings = tiny_settings(
-            window=63, filters=14, narrow_units=5, dropout=0.3, rows=16, fast=True
-        )
-        gan = of_paper.NoiseGAN(
-            of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings
-        )
-        gan.compile()
+        settings = tiny_settings(**SMALL, dropout=0.3, rows=16, fast=True)
+        networks = of_paper.build_generator(settings), of_paper.build_discriminator(settings)
+        gan = of_paper.connect(*networks, settings)
         convolution, *_, narrow, _ = gan.discriminator.layers
         drops = [layer.seed_generator.state for layer in (convolution.dropout, narrow)]
         before = [each.numpy().copy() for each in drops]
@@ -229,7 +210,7 @@ def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
     [({"dropout": 0}, 3), ({"dropout": 0.3}, 4), ({"dropout": 0.3, "stride": 3}, 6)],
 )
 def test_a_width_that_is_no_multiple_of_the_stride_is_left_to_keras(changed, kinds):
-    model = small_discriminator(**changed)
+    model = of_paper.build_discriminator(tiny_settings(**SMALL, **changed))
     fast, rows = with_fast_convolution(model), RNG(0).normal(size=(4, 63, 1)).astype(np.float32)
     assert len(fast.layers) == kinds and (fast is model) == (kinds == 6)
     np.testing.assert_allclose(fast(rows), model(rows), rtol=1e-5)

@@ -1,4 +1,6 @@
-"""Tests of the engines: every item is computed once even if workers die, in single-threaded processes; errors are one line."""
+"""Tests of the engines: every item is computed once even if workers die, in single-threaded
+processes; errors are one line.
+"""
 
 import functools
 import importlib.util
@@ -23,6 +25,7 @@ from tests.small_data_set import (
     threads_of,
 )
 
+ROOT = Path(__file__).parents[2]
 with_ray = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed"
 )
@@ -61,12 +64,9 @@ def test_a_killed_process_is_replaced_and_no_item_is_lost_or_repeated():
 
 
 def test_repeated_worker_failures_end_the_run(refused):
-    with refused("died in a row", "--workers"):
-        try:
-            list(engines.run("local", die_at_thirteen, [13], 1))
-        except ProcessesDiedError as died:
-            assert died.items == (13,)
-            raise
+    with refused("died in a row", "--workers") as caught:
+        list(engines.run("local", die_at_thirteen, [13], 1))
+    assert isinstance(caught.value, ProcessesDiedError) and caught.value.items == (13,)
 
 
 def test_an_input_error_of_the_work_is_raised_unchanged(refused):
@@ -76,12 +76,8 @@ def test_an_input_error_of_the_work_is_raised_unchanged(refused):
 
 
 def test_numbers_of_workers_are_parsed(refused):
-    assert [engines.parse_workers(text) for text in (None, "auto", "1", "512")] == [
-        None,
-        None,
-        1,
-        512,
-    ]
+    for text, number in ((None, None), ("auto", None), ("1", 1), ("512", 512)):
+        assert engines.parse_workers(text) == number
     for text, engine in (
         ("0", None),
         ("513", "local"),
@@ -95,61 +91,62 @@ def test_numbers_of_workers_are_parsed(refused):
 
 def test_without_items_no_process_is_started(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    assert (
-        list(engines.run("local", refuse, [], 2)) == list(engines.run("ray", refuse, [], 2)) == []
-    )
+    for engine in ("local", "ray"):
+        assert list(engines.run(engine, refuse, [], 2)) == []
     assert not multiprocessing.active_children()
 
 
-def test_a_missing_ray_package_raises_one_line(monkeypatch, refused):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    with refused("pip install"):
-        list(engines.run("ray", refuse, [1], 2))
+@pytest.fixture
+def machines(monkeypatch):
+    """A Ray cluster of two machines, of which the second one may be lost."""
+    cluster_utils = pytest.importorskip(
+        "ray.cluster_utils", reason="the optional extra ray is not installed"
+    )
+    # so that processes can import the work
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    cluster = cluster_utils.Cluster()
+    try:
+        cluster.add_node(wait=False, num_cpus=1, include_dashboard=False)
+        second = cluster.add_node(wait=False, num_cpus=1)
+        cluster.wait_for_nodes(300)  # Ray itself waits 30 s, too short on a busy machine
+        monkeypatch.setenv("RAY_ADDRESS", cluster.address)
+        yield cluster, second
+    finally:
+        cluster.shutdown()
 
 
 @pytest.mark.slow
-@with_ray
-def test_ray_gives_the_same_results_and_replaces_killed_processes(tmp_path, monkeypatch, refused):
+def test_ray_gives_the_same_results_and_replaces_killed_processes(machines, tmp_path, refused):
     import ray
 
     from enhsim_tf.common.parallel.ray import _cluster
 
-    monkeypatch.setenv(
-        "PYTHONPATH", str(Path(__file__).parents[2])
-    )  # so that processes can import the work
-    monkeypatch.delenv("RAY_ADDRESS", raising=False)
-    with _cluster():  # one cluster for all checks, since starting one takes as long as the rest
-        running, found = engines.run("ray", threads_and_square, range(60), 2), []
-        for done in running:
-            found.append(done[0])
-            assert done[2:] == ("1", False)
-            if len(found) == 20:
-                os.kill(done[1], signal.SIGKILL)
-        assert sorted(found) == [number**2 for number in range(60)]
-        (tmp_path / "met").mkdir()
-        running, found = (
-            engines.run("ray", functools.partial(meet, tmp_path / "met", 8), range(60), 8),
-            [],
-        )
-        for done in running:
-            found.append(done)
-            if len(found) == 1:  # all eight at once, as when a node is lost with all its processes
-                for process in os.listdir(tmp_path / "met"):
-                    os.kill(int(process), signal.SIGKILL)
-        assert sorted(found) == list(range(60)) and len(os.listdir(tmp_path / "met")) > 8
+    with _cluster():  # one connection for all checks
+        found = []
+        for square, process, *how in engines.run("ray", threads_and_square, range(30), 2):
+            found.append(square)
+            assert how == ["1", False]
+            if len(found) == 10:
+                os.kill(process, signal.SIGKILL)
+        assert sorted(found) == [number**2 for number in range(30)]
         assert list(engines.run("ray", threads_of, [1], 1)) == [("1", {1})]
         with refused("another number"):
             list(engines.run("ray", refuse, range(5), 1))
         with refused("died in a row"):
             list(engines.run("ray", die_at_thirteen, [13], 1))
-        asked = plan(150, 50)
-        records = list(
-            engines.run("ray", PlainMaker(asked, tmp_path), range(3), 3)
-        )  # on two cores: more processes than CPUs
-        (tmp_path / "here").mkdir()
-        assert sorted(records) == [
-            PlainMaker(asked, tmp_path / "here")(shard) for shard in range(3)
-        ]
+        asked, here = plan(150, 50), tmp_path / "here"
+        here.mkdir()
+        # on two processors: more processes than CPUs
+        records = list(engines.run("ray", PlainMaker(asked, tmp_path), range(3), 3))
+        assert sorted(records) == [PlainMaker(asked, here)(shard) for shard in range(3)]
+        met, found = tmp_path / "met", []
+        met.mkdir()
+        for done in engines.run("ray", functools.partial(meet, met, 4), range(30), 4):
+            found.append(done)
+            if len(found) == 1:  # a machine is lost with both of its processes
+                cluster, second = machines
+                cluster.remove_node(second, allow_graceful=False)
+        assert sorted(found) == list(range(30))
     assert not ray.is_initialized()
 
 
@@ -177,5 +174,5 @@ def test_a_missing_cluster_raises_one_line_and_a_local_one_starts_after_it(monke
         with refused(address):
             list(engines.run("ray", threads_and_square, [1], 1))
     monkeypatch.delenv("RAY_ADDRESS")
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
     assert [done[0] for done in engines.run("ray", threads_and_square, [3], 1)] == [9]

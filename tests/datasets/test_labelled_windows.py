@@ -1,4 +1,6 @@
-"""Labelled windows: compared with closed forms, dependence on plan and shard only, and invalid plans."""
+"""Labelled windows: compared with closed forms, dependence on plan and shard only, and invalid
+plans.
+"""
 
 import collections
 import dataclasses
@@ -51,24 +53,18 @@ def test_each_window_agrees_with_its_labels(tmp_path):
     )
     for row, same, scenario in zip(table.itertuples(), nominal["window"], scenarios, strict=True):
         candidates = COARSE.simulate(times, scenario)
-        assert (
-            np.abs(candidates - row.window).max(axis=1).min() < 1e-4
-        )  # the tolerance of a simulator without noise
+        # the tolerance of a simulator without noise
+        assert np.abs(candidates - row.window).max(axis=1).min() < 1e-4
         mask = row.window != same
         np.testing.assert_array_equal(row.mask, mask)
         if mask.any():
             assert (row.scenario, row.severity) == (scenario.mode, np.float32(scenario.severity))
-            assert (row.onset, row.end) == (
-                np.flatnonzero(mask)[0],
-                np.flatnonzero(mask)[-1] + 1,
-            ) and row.onset >= 6
+            changed = np.flatnonzero(mask)
+            assert (row.onset, row.end) == (changed[0], changed[-1] + 1) and row.onset >= 6
             severities.append(row.severity)
         else:  # some stuck mechanisms would have stood still anyway
-            assert (
-                (row.scenario, row.severity) == ("nominal", 0)
-                and np.isnan(row.onset)
-                and np.isnan(row.end)
-            )
+            assert (row.scenario, row.severity) == ("nominal", 0)
+            assert np.isnan(row.onset) and np.isnan(row.end)
     assert len(set(severities)) == len(severities) > 120
     assert np.mean(severities) == pytest.approx(0.55, abs=5 * 0.7 / np.sqrt(12 * 120))
 
@@ -83,21 +79,16 @@ def test_a_shard_depends_only_on_plan_and_number(tmp_path):
     assert [maker(shard) for shard in reversed(range(5))][::-1] == forth
     assert PlainMaker(plan(100_000, 50), folders[2])(3) == forth[3], "however many there are"
     assert len(set(forth)) == 5 and pq.read_metadata(folders[0] / shard_file(4)).num_rows == 30
-    for other in (
-        plan(230, 50, seed=4),
-        plan(230, 50, checksum="1" * 64),
-        plan(230, 50, scenarios=ALL),
-    ):
-        assert PlainMaker(other, folders[2])(3) != forth[3]
+    others = {"seed": 4}, {"checksum": "1" * 64}, {"scenarios": ALL}
+    for changed in others:
+        assert PlainMaker(plan(230, 50, **changed), folders[2])(3) != forth[3]
 
 
 def test_one_file_has_the_windows_of_the_shards_one_after_the_other(tmp_path):
     some = plan(230, 50)
     for shard in range(5):
         PlainMaker(some, tmp_path)(shard)
-    shards = pd.concat(
-        [pd.read_parquet(tmp_path / shard_file(shard)) for shard in range(5)], ignore_index=True
-    )
+    shards = pd.read_parquet(sorted(tmp_path.iterdir()))
     pd.testing.assert_frame_equal(written(tmp_path / "x", some, plain()), shards)
 
 
@@ -124,9 +115,8 @@ def test_rare_categories_and_the_order_are_random():
     halves = np.stack(
         [systematic([0.5, 0.5], 10, np.random.default_rng(seed)) for seed in range(2_000)]
     )
-    np.testing.assert_allclose(
-        halves.mean(axis=0), 0.5, atol=5 * 0.5 / np.sqrt(2_000)
-    )  # the same at every position
+    # the same at every position
+    np.testing.assert_allclose(halves.mean(axis=0), 0.5, atol=5 * 0.5 / np.sqrt(2_000))
 
 
 def test_other_programs_can_read_the_file(tmp_path):
@@ -135,12 +125,8 @@ def test_other_programs_can_read_the_file(tmp_path):
     schema = pq.read_schema(tmp_path / "x")
     assert schema.field("window").type.list_size == schema.field("mask").type.list_size == WINDOW
     assert str(schema.field("window").type.value_type) == "float"
-    assert [str(schema.field(name).type) for name in LABELS[:4]] == [
-        "string",
-        "float",
-        "int32",
-        "int32",
-    ]
+    types = [str(schema.field(name).type) for name in LABELS[:4]]
+    assert types == ["string", "float", "int32", "int32"]
     assert schema.metadata[b"interval_s"] == b"2.0" and schema.metadata[b"channel"] == b"volts"
     assert schema.metadata[b"settings"].decode() == plan_key(some.settings())
     assert 0 < pq.read_table(tmp_path / "x", filters=[("scenario", "==", "stuck")]).num_rows <= 25
@@ -164,24 +150,17 @@ def planned(simulator, folder, *scenarios, nominal=0.5, windows=20_000, seed=1):
 
 def test_a_plan_holds_what_its_model_says_and_no_path(tmp_path):
     made = planned(plain(), tmp_path / "volts")
-    assert (made.window, made.interval_s, made.channels, made.nominal_share) == (
-        60,
-        2.0,
-        ("volts",),
-        1.0,
-    )
+    assert (made.window, made.interval_s, made.channels) == (60, 2.0, ("volts",))
+    assert made.nominal_share == 1.0
     assert (made.shard, made.num_shards, made.num_windows_in(2)) == (8_000, 3, 4_000)
     assert str(tmp_path) not in json.dumps(made.settings())
 
 
 def test_a_scenario_may_concern_one_channel(tmp_path, refused):
-    both, drift = (
-        of_waves([COARSE, COARSE], 60, interval_s=2.0),
-        ScenarioRange("drift", (1.0, 1.0), (0.5, 0.5), "amps"),
-    )
-    table = written(
-        tmp_path / "x", planned(both, tmp_path / "model", drift, nominal=0.0, windows=8), both
-    )
+    both = of_waves([COARSE, COARSE], 60, interval_s=2.0)
+    drift = ScenarioRange("drift", (1.0, 1.0), (0.5, 0.5), "amps")
+    asked = planned(both, tmp_path / "model", drift, nominal=0.0, windows=8)
+    table = written(tmp_path / "x", asked, both)
     assert list(table) == ["window volts", "window amps", *LABELS, "mask volts", "mask amps"]
     assert not np.stack(table["mask volts"]).any() and np.stack(table["mask amps"])[:, 31:].all()
     with refused("volts, amps", "'watts' in the scenario"):
@@ -209,11 +188,8 @@ def test_data_sets_with_sizes_out_of_range_are_refused(changes, words, refused):
 
 
 def test_each_scenario_has_a_window_in_the_smallest_data_set():
-    assert {each and each.mode for each in draw_scenarios(plan(4), 0)} == {
-        None,
-        "stuck",
-        "gain_loss",
-    }
+    modes = {scenario and scenario.mode for scenario in draw_scenarios(plan(4), 0)}
+    assert modes == {None, "stuck", "gain_loss"}
     assert draw_scenarios(plan(4, nominal=1.0), 0) == [None] * 4
 
 

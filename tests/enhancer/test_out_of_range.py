@@ -2,18 +2,16 @@
 
 import numpy as np
 import pytest
-import scipy.stats
 
-from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.detection.metrics import threshold
+from enhsim_tf.coarse.degraded import Degraded
+from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.out_of_range import OutOfRange
+from enhsim_tf.scoring.metrics import threshold
 
 PERIODS, SIZES, WINDOW = (480, 120), (0.5, 0.25), 500
 COARSE = SquareWaveSimulator(
     [SquareWave(period, low=-size, high=size) for period, size in zip(PERIODS, SIZES, strict=True)]
 )
-SEVERITIES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def times(number, seed):
@@ -40,7 +38,8 @@ def fitted(training):
 
 
 def test_points_by_hand():
-    # the first axis explains all but 1 / 41 of the variance; unit: root mean square of all twelve coordinates
+    # the first axis explains all but 1 / 41 of the variance; unit: root mean square of all twelve
+    # coordinates
     training = 7 + np.array(
         [[-4.0, 0, 0], [4, 0, 0], [-2, 0.5, 0], [-2, -0.5, 0], [2, 0.5, 0], [2, -0.5, 0]]
     )
@@ -64,22 +63,12 @@ def test_a_score_has_no_unit_and_does_not_count_repeats(fitted, training):
 
 
 def test_nominal_windows_are_in_range(fitted):
-    scores, further = (
-        fitted.score(COARSE.simulate(times(1_000, 1))),
-        fitted.score(COARSE.simulate(times(1_000, 5))),
-    )
+    scores, further = (fitted.score(COARSE.simulate(times(1_000, seed))) for seed in (1, 5))
     limit = threshold(scores, 0.01)
     assert np.mean(further > limit) < 0.01 + 4 * np.sqrt(0.01 / 1_000)
     for mode in ("stuck", "drift", "dropout", "period_change"):
         assert np.mean(fitted.score(degraded(mode, 0.5)) > limit) > 0.95
     assert fitted.score(degraded("drift", 1.0)).min() > 3 * limit
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_the_score_rises_with_severity(mode, fitted):
-    means = [fitted.score(degraded(mode, severity)).mean() for severity in SEVERITIES]
-    assert scipy.stats.spearmanr(means, SEVERITIES)[0] > 0.9
-    assert means[-1] > 1.1 * means[0]
 
 
 def test_waves_in_phases_that_training_never_had_are_seen_by_their_distance(fitted):

@@ -10,13 +10,10 @@ from enhsim_tf.enhancer.ridge import PENALTIES, fit_ridge
 def _linear(num_windows, noise=0.1, seed=0, samples=12, outputs=7, columns=2):
     """Windows of two columns of different size, a known linear map of them, and noise."""
     rng = np.random.default_rng(seed)
-    inputs = (
-        rng.standard_normal((num_windows, samples, columns)) * np.array([1.0, 30.0])[:columns] + 4
-    )
-    matrix = (
-        np.random.default_rng(99).standard_normal((samples * columns, outputs))
-        / np.tile([1.0, 30.0][:columns], samples)[:, None]
-    )
+    scales = np.array([1.0, 30.0])[:columns]
+    inputs = rng.standard_normal((num_windows, samples, columns)) * scales + 4
+    matrix = np.random.default_rng(99).standard_normal((samples * columns, outputs))
+    matrix /= np.tile(scales, samples)[:, None]
     clean = inputs.reshape(num_windows, -1) @ matrix + 2
     return inputs, clean + noise * rng.standard_normal(clean.shape), clean
 
@@ -27,18 +24,16 @@ def _standardised(inputs, like):
     return ((inputs - like.mean(axis=0)) / deviation).reshape(len(inputs), -1)
 
 
-# so few that two factors hold fewer numbers: 5 * (24 + 7) < 24 * 7 <= 6 * (24 + 7); fewer than inputs; as many; more
+# so few that two factors hold fewer numbers: 5 * (24 + 7) < 24 * 7 <= 6 * (24 + 7); fewer than
+# inputs; as many; more
 @pytest.mark.parametrize("num_windows", [5, 6, 24, 200])
 @pytest.mark.parametrize("penalty", [1e-3, 1e4])
 def test_it_is_scikit_learns_on_standardised_windows(num_windows, penalty):
     inputs, targets, _ = _linear(num_windows)
     new, *_ = _linear(5, seed=1)
     found = fit_ridge(inputs, targets, penalties=[penalty])
-    expected = (
-        SklearnRidge(alpha=penalty)
-        .fit(_standardised(inputs, inputs), targets)
-        .predict(_standardised(new, inputs))
-    )
+    expected = SklearnRidge(alpha=penalty).fit(_standardised(inputs, inputs), targets)
+    expected = expected.predict(_standardised(new, inputs))
     np.testing.assert_allclose(found.predict(new), expected, rtol=1e-5, atol=1e-5)
     assert found.penalty == penalty and found.predict(new).dtype == np.float32
     assert len(found.factors) == (2 if num_windows == 5 else 1)
@@ -50,22 +45,14 @@ def test_the_chosen_penalty_is_that_of_a_plain_loop():
     penalties, squares = [0.1, 30.0, 1000.0], np.zeros(3)
     for held_out in np.array_split(np.arange(60), 5):
         training = np.setdiff1d(np.arange(60), held_out)
+        learnt, judged = (
+            _standardised(inputs[rows], inputs[training]) for rows in (training, held_out)
+        )
         for number, penalty in enumerate(penalties):
-            model = SklearnRidge(alpha=penalty).fit(
-                _standardised(inputs[training], inputs[training]), targets[training]
-            )
-            squares[number] += np.sum(
-                (
-                    model.predict(_standardised(inputs[held_out], inputs[training]))
-                    - targets[held_out]
-                )
-                ** 2
-            )
-    assert (
-        fit_ridge(inputs, targets, penalties=penalties).penalty
-        == penalties[np.argmin(squares)]
-        == 30.0
-    )
+            model = SklearnRidge(alpha=penalty).fit(learnt, targets[training])
+            squares[number] += np.sum((model.predict(judged) - targets[held_out]) ** 2)
+    found = fit_ridge(inputs, targets, penalties=penalties).penalty
+    assert found == penalties[np.argmin(squares)] == 30.0
 
 
 def test_constant_samples_and_constant_columns_do_no_harm():
@@ -131,16 +118,12 @@ def test_chosen_penalties_are_kept_and_nothing_is_cross_validated():
 
 
 def test_windows_may_overlap_and_come_in_any_order():
-    # each window twice: without their starts, the copy in training would make the smallest penalty the best
+    # each window twice: without their starts, the copy in training would make the smallest penalty
+    # the best
     inputs, targets, _ = _linear(60, noise=10.0, samples=40)
-    inputs, targets, starts = (
-        inputs.repeat(2, axis=0),
-        targets.repeat(2, axis=0),
-        np.repeat(40 * np.arange(60), 2),
-    )
+    starts = np.repeat(40 * np.arange(60), 2)
+    inputs, targets = (each.repeat(2, axis=0) for each in (inputs, targets))
     order = np.random.default_rng(3).permutation(120)
-    first, second = (
-        fit_ridge(inputs, targets, starts),
-        fit_ridge(inputs[order], targets[order], starts[order]),
-    )
-    assert first.penalty == second.penalty > fit_ridge(inputs[order], targets[order]).penalty
+    shuffled = inputs[order], targets[order]
+    first, second = fit_ridge(inputs, targets, starts), fit_ridge(*shuffled, starts[order])
+    assert first.penalty == second.penalty > fit_ridge(*shuffled).penalty

@@ -1,7 +1,9 @@
-"""What the files of this folder share: changed inputs, and the judgement of what a reader does with one.
+"""What the files of this folder share: changed inputs, and the judgement of what a reader does with
+one.
 
-Every input is accepted, or refused with an `InputError` of one printable line. The slow tests try a few inputs of each reader, the same each
-time; `ENHSIM_TF_FUZZ=10000 python -m pytest --slow tests/fuzzing` tries as many others.
+Every input is accepted, or refused with an `InputError` of one printable line. The slow tests try a
+few inputs of each reader, the same each time; `ENHSIM_TF_FUZZ=10000 python -m pytest --slow
+tests/fuzzing` tries as many others.
 """
 
 import os
@@ -23,12 +25,17 @@ NASTY = (
     "nan", "-inf", "1e999", "-0", "1" * 400, "0x10", "1_000", "٣", "1.500,0", "9999-12-31T23:59:60Z", "0001-01-01", "2024-10-27 02:30:00", "=", ":", "%",
     "%ff", "&", "?", "#", "1:2:3", "1e-400", "*a", "&a", "!!python/object:os.system", "- ", "\t", '"', ",,,,", ";", "P1D", "-9223372036854775808",
 )  # fmt: skip
-_PIECES = st.sampled_from([text.encode() for text in NASTY]) | st.binary(max_size=8)
+# long cells and names, which no pattern may take more than linear time for
+LONG = [text * (30_000 // len(text)) for text in ("7", "x", "1.", "a:", "='", "1 ", "[", '"')]
+LONG += ["7" * 20_000 + " V", "1," * 30_000]
+_PIECES = st.sampled_from([text.encode() for text in (*NASTY, *LONG)]) | st.binary(max_size=8)
 
 
 @st.composite
 def changed(draw, seeds):
-    """Valid bytes in which up to four pieces are replaced, dropped, repeated, or taken from another valid input."""
+    """Valid bytes in which up to four pieces are replaced, dropped, repeated, or taken from another
+    valid input.
+    """
     data = draw(st.sampled_from(seeds))
     for _ in range(draw(st.integers(0, 4))):
         begin = draw(st.integers(0, len(data)))
@@ -56,7 +63,9 @@ def tried(examples):
 
 
 def judge(read, *arguments):
-    """Calls a reader with the arguments and an empty folder; any outcome but acceptance, True, and a good refusal, False, raises."""
+    """Calls a reader with the arguments and an empty folder; any outcome but acceptance, True, and
+    a good refusal, False, raises.
+    """
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -73,7 +82,9 @@ def judge(read, *arguments):
 
 
 def is_good(line):
-    """Whether an error message is one short printable line that says what was expected and received."""
+    """Whether an error message is one short printable line that says what was expected and
+    received.
+    """
     return (
         line.isprintable()
         and len(line) <= _MAX_CHARACTERS

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.sources import read_source
-from tests.fuzzing.readers import all_of, changed, judge, tried
+from tests.fuzzing.readers import LONG, all_of, changed, judge, tried
 
 NUM = 60
 WAVE = np.round(np.sin(np.arange(NUM) / 5), 3)
@@ -171,3 +171,18 @@ def test_a_time_too_far_off_for_its_zone_is_refused(tmp_path, refused):
     pd.DataFrame({"time": times, "value": [1.0, 2.0, 3.0]}).to_parquet(tmp_path / "x.parquet")
     with refused("a time out of range", "row 2"):
         read_source(tmp_path / "x.parquet")
+
+
+@pytest.mark.parametrize("piece", LONG, ids=range(len(LONG)))
+def test_long_names_and_cells_are_read_or_refused(piece):
+    seeds = csv_seeds()
+    judge(read_file, "x.csv", seeds[2].replace(b"value", piece.encode(), 1))
+    judge(read_file, "x.csv", seeds[2].replace(b"\n60;", b"\n60;" + piece.encode(), 1))
+    judge(read_file, "x.csv", seeds[0].replace(b"04:00:00", piece.encode(), 1))
+
+
+def test_a_line_may_be_longer_than_a_field_of_the_csv_module(tmp_path):
+    names = ["time", *(f"channel {number} of a bus" for number in range(8_000))]
+    rows = [",".join(map(str, [second, *[second**2 % 7] * 8_000])) for second in range(12)]
+    (tmp_path / "x.csv").write_text("\n".join([",".join(names), *rows]))
+    assert list(read_source(tmp_path / "x.csv")) == names[1:]

@@ -91,7 +91,7 @@ READERS = {
     command_line: [
         "fit\nx.csv\n--out\nmodels\n--window\n64\n--noise\nbest",
         "generate\nmodels\n--windows\n10_000\n--scenario\nstuck:0.5\n--workers\nauto\n--out\nset",
-        "score\nmodels\nx.csv\n--detector\npca-residual\n--false-alarm-rate\n0.01\n--out\ny.csv\n--seed\n3",
+        "score\nmodels\nx.csv\n--false-alarm-rate\n0.01\n--out\ny.csv",
         "--help",
     ],
     lambda text, folder: parse_scenario(text): ["stuck:0.5:0.25", "volts=drift:0.2-0.8:1e-3-0.9"],

@@ -3,13 +3,14 @@
 import json
 import os
 import pickle
+import re
 import zipfile
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.cli.options import channels_by_model
+from enhsim_tf.cli.shared import channels_by_model
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.sources import read_source
@@ -48,7 +49,7 @@ MODELS = {
     "settings cut off": ("settings.json", half, "missing or damaged file"),
     "another version": (
         "manifest.json",
-        lambda content: content.replace(b"Simulator/6", b"Simulator/4"),
+        lambda content: re.sub(rb"Simulator/\d+", b"Simulator/4", content),
         "format 4",
     ),
     "another program": (
@@ -85,7 +86,9 @@ def test_a_model_with_a_part_that_this_version_does_not_know_is_refused(model, r
         EnhancedSimulator.load(model)
 
 
-@pytest.mark.parametrize("content", [b"{", b"{}", b"\xff"])
+@pytest.mark.parametrize(
+    "content", [b"{", b"{}", b"\xff", b"[" * 100_000, b'{"channels": null}', b'{"channels": [3]}']
+)
 def test_a_model_without_names_of_channels_is_refused_before_it_is_loaded(model, refused, content):
     (model / "settings.json").write_bytes(content)
     with refused("settings.json"):

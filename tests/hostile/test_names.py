@@ -1,4 +1,6 @@
-"""Hostile names of channels, columns and sources cannot leave their folder, and are printed as one plain line."""
+"""Hostile names of channels, columns and sources cannot leave their folder, and are printed as one
+plain line.
+"""
 
 import json
 import os
@@ -15,6 +17,7 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.simulator.model_folder import folder_of, models_of
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.sources import read_source
+from tests.fitted_simulators import TINY
 from tests.small_data_set import plain
 
 NAMES = (
@@ -23,13 +26,14 @@ NAMES = (
     "-rf", "~", "%2e%2e", "%", "a?b*c|d", "$HOME", "`id`", "a" * 160,
 )  # fmt: skip
 REFUSED = ("", "a" * 181, "é" * 40, "\ud800", "a\udcffb", "." * 61)
+# reserved by Windows
 KEPT = {
     "con",
     "prn",
     "aux",
     "nul",
     *(f"{port}{number}" for port in ("com", "lpt") for number in range(10)),
-}  # reserved by Windows
+}
 ALLOWED = set(string.ascii_letters + string.digits + "%_-~ ")
 
 
@@ -76,9 +80,8 @@ def lines_of(capfd):
     return lines
 
 
-COMMANDED = [
-    name for name in NAMES if name == name.strip()
-]  # spaces around the column names of a table are stripped
+# spaces around the column names of a table are stripped
+COMMANDED = [name for name in NAMES if name == name.strip()]
 
 
 @pytest.fixture
@@ -122,20 +125,12 @@ def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
     table_of([*names, "short\x1b[31m\n"], 1_500).assign(
         **{"short\x1b[31m\n": [1.0] * 2 + [np.nan] * 1_498}
     ).to_parquet(source)
-    tiny = [
-        "--num-windows",
-        "40",
-        "--window",
-        "64",
-        "--enhancer",
-        "ridge",
-        "--noise",
-        "residual-windows",
-        "--separately",
-        "--workers",
-        "1",
-    ]
-    assert main(["fit", str(source), "--out", str(out), *tiny]) == 2  # one is too short
+    assert (
+        main(
+            ["fit", str(source), "--out", str(out), *TINY.split(), "--separately", "--workers", "1"]
+        )
+        == 2
+    )  # one is too short
     made = files_below(tmp_path) - {source}
     assert {path.parent for path in made} == {folder_of(out, name) for name in names}
     assert set(models_of(out)) == set(names)
@@ -145,9 +140,8 @@ def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
         and sum(line.startswith("error: short") for line in lines) == 1
     )
     report = json.loads((folder_of(out, names[0]) / "report.json").read_text())
-    assert (
-        list(report["cleaning"]) == report["report"]["channels"] == [names[0]]
-    )  # JSON keeps the name unchanged
+    # JSON keeps the name unchanged
+    assert list(report["cleaning"]) == report["report"]["channels"] == [names[0]]
     assert "\x1b" not in (folder_of(out, names[0]) / "report.json").read_text()
 
 

@@ -1,4 +1,6 @@
-"""Refused input of the commands: exit code 2, one line that says what was expected and received, and no files written."""
+"""Refused input of the commands: exit code 2, one line that says what was expected and received,
+and no files written.
+"""
 
 import pytest
 
@@ -7,10 +9,12 @@ from enhsim_tf.reproduce import main
 
 @pytest.fixture
 def refused_line(tmp_path, capfd):
-    """Runs the command and checks that it refuses: exit code 2, one line, and no file written. Returns the line."""
+    """Runs the command and checks that it refuses: exit code 2, one line, and no file or folder
+    written. Returns the line.
+    """
 
     def files():
-        return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+        return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
 
     def run(*arguments):
         before = files()
@@ -38,16 +42,16 @@ def refused_line(tmp_path, capfd):
     ("arguments", "word"),
     [
         (["--seed", "-1"], "-1"),
-        (
-            ["--seed", str(2**32)],
-            str(2**32),
-        ),  # the detectors and the classifier accept no larger seed
+        # the detectors and the classifier accept no larger seed
+        (["--seed", str(2**32)], str(2**32)),
         (["--only", "fig99"], "fig99"),
         (["--seed", "abc"], "'abc'"),
         (["--budget", "tiny"], "'tiny'"),
         (["--sed", "3"], "--sed 3"),
         (["--set", "dropout"], "dropout"),
         (["--set", "no_such=1"], "no_such"),
+        (["--set", "seed=1"], "--seed"),
+        (["--set", "budget=full"], "--budget"),
         (["--column", "0"], "--telemetry"),
         (["--telemetry", "no/such/file.npy"], "no/such/file.npy"),
     ],

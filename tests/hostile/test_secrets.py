@@ -6,6 +6,7 @@ Tests that need a server are in `test_influx_server.py::test_the_token_appears_n
 import logging
 import pickle
 
+import numpy as np
 import pytest
 
 from enhsim_tf.__main__ import main
@@ -16,6 +17,7 @@ from enhsim_tf.telemetry.sources import read_source
 from tests.hostile.test_names import table_of
 from tests.small_data_set import plain
 
+NOMINAL = np.random.default_rng(0).standard_normal((500, 1)).astype(np.float32)
 TOKEN, PASSWORD = "token-0123456789abcdef==", "pass-0123456789"
 
 
@@ -26,7 +28,7 @@ def named_cluster(pretended, monkeypatch):
 
 @pytest.fixture
 def world(tmp_path):
-    plain(channels=("volts",)).save(folder_of(tmp_path / "models", "volts"))
+    plain(channels=("volts",), nominal=[NOMINAL]).save(folder_of(tmp_path / "models", "volts"))
     table_of(["volts"]).to_csv(tmp_path / "x.csv", index=False)
     return tmp_path
 
@@ -74,10 +76,6 @@ RUNS = {
         "score",
         "{0}/models",
         "{0}/x.csv",
-        "--windows",
-        "40",
-        "--detector",
-        "limit-check",
         "--out",
         "{0}/y.parquet",
     ],
@@ -151,11 +149,17 @@ def test_no_refusal_repeats_the_token(monkeypatch, token):
 
 
 def test_addresses_and_words_without_secrets_stay_as_they_are(monkeypatch):
-    monkeypatch.setenv(
-        "INFLUXDB_V2_TOKEN", "a"
-    )  # a short token may be an ordinary word of a message
+    # a short token may be an ordinary word of a message
+    monkeypatch.setenv("INFLUXDB_V2_TOKEN", "a")
     for text in (
         "Expected a time at 12:30. Received: http://host:8086/a@b.",
         "Expected a. Received: influxdb://bucket/measurement/a:b@c.",
     ):
         assert str(InputError(text)) == text
+
+
+@pytest.mark.parametrize("letter", ["x", "a:", "='", "//a:", "(", "@"])
+def test_a_secret_between_very_long_names_is_masked(letter):
+    url = f"https://user:{PASSWORD}@host:8086"
+    line = str(InputError(f"Expected {url} {letter * 50_000}. Received: {letter * 50_000} {url}."))
+    assert PASSWORD not in line and line.startswith("Expected https://***@") and len(line) <= 600

@@ -24,9 +24,8 @@ def test_the_network_is_that_of_figure_3():
     [("by layer", np.sqrt(6 / (100 + 32))), ("he_uniform", np.sqrt(6 / 100))],
 )
 def test_weights_begin_with_the_initialiser_asked_for(initialisers, limit):
-    hidden = np.asarray(
-        build_enhancer(tiny_settings(initialisers=initialisers)).layers[1].kernel
-    )  # 100 inputs, 32 units
+    # 100 inputs, 32 units
+    hidden = np.asarray(build_enhancer(tiny_settings(initialisers=initialisers)).layers[1].kernel)
     assert limit * 0.99 < np.abs(hidden).max() <= limit
 
 

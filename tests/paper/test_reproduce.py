@@ -23,17 +23,15 @@ def ran(cache, pipeline, tmp_path_factory):
     """The command at the tiny size, which finds the stages of the pipeline in the cache."""
     judge_all(pipeline)
     out = tmp_path_factory.mktemp("out")
-    code = reproduce.main(
-        ["--budget", "smoke", "--cache", str(cache), "--out", str(out), *TINY_OPTIONS]
-    )
+    code = reproduce.main(f"--budget smoke --cache {cache} --out {out}".split() + TINY_OPTIONS)
     return code, out, json.loads((out / "results.json").read_text())
 
 
 def test_every_figure_is_written_and_the_page_shows_it(ran):
     code, out, found = ran
-    assert code == 0 and [row["this run"] for row in found["box"]] == [
-        claim["verdict"] for claim in found["claims"]
-    ]
+    assert code == 0
+    verdicts = [claim["verdict"] for claim in found["claims"]]
+    assert [row["this run"] for row in found["box"]] == verdicts
     page = (out / "report.html").read_text()
     for name in FIGURES:
         assert (out / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
@@ -41,6 +39,30 @@ def test_every_figure_is_written_and_the_page_shows_it(ran):
     assert not re.search(
         r"<script|https?://(?!arxiv\.org)[^\"]*\"", re.sub(r'src="data:[^"]*"', "", page)
     )
+
+
+@pytest.mark.parametrize(
+    ("given", "folder"),
+    [
+        ([], "figures"),
+        (["--only", "fig04"], "figures"),
+        (["--seed", "3"], "figures_seed3"),
+        (["--seed", "3", "--only", "fig04"], "figures_seed3"),
+        (["--set", "dropout=0"], "figures_changed"),
+        (["--budget", "smoke", "--seed", "3"], "smoke_seed3"),
+        (["--seed", "3", "--out", "figures"], "figures"),
+    ],
+)
+def test_only_the_published_run_writes_to_the_figures_of_its_own_accord(given, folder):
+    assert reproduce.choose_folder(reproduce.parse(given)) == Path(folder)
+
+
+@pytest.mark.parametrize("out", [[], ["--out", "new"]])
+def test_refused_telemetry_leaves_no_folder(out, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    asked = "--telemetry missing.csv --column volts --time utc --cache cache".split()
+    assert reproduce.main(asked + out) == 2
+    assert not list(tmp_path.iterdir())
 
 
 def test_figures_that_a_run_draws_first_need_no_trained_network(tmp_path):
@@ -103,55 +125,24 @@ def test_a_channel_of_ones_own_keeps_its_times_and_is_scaled_by_its_square_wave(
     table.to_csv(tmp_path / "x.csv", index=False) if kind == "csv" else table.to_parquet(
         tmp_path / "x.parquet"
     )
-    arguments = [
-        "--telemetry",
-        tmp_path / f"x.{kind}",
-        "--column",
-        "volts",
-        "--time",
-        "utc",
-        "--only",
-        "fig14",
-    ]
-    assert (
-        reproduce.main(
-            [
-                str(each)
-                for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]
-            ]
-        )
-        == 0
-    )
+    words = f"--telemetry {tmp_path}/x.{kind} --column volts --time utc --only fig14"
+    assert reproduce.main(f"{words} --out {tmp_path}/out --cache {tmp_path}/cache".split()) == 0
     (folder,) = (tmp_path / "cache").iterdir()
     kept = ParquetStore(folder / "telemetry.parquet").read()
     assert (kept.start, kept.interval, len(kept.values)) == ("2021-03-04T05:06:07Z", 30, 4_000)
-    slope, offset = np.polyfit(
-        values, kept.values, 1
-    )  # the pipeline's unit is that of the square wave
+    # the pipeline's unit is that of the square wave
+    slope, offset = np.polyfit(values, kept.values, 1)
     np.testing.assert_allclose(kept.values, slope * values + offset, atol=1e-5)
 
 
 def test_claims_that_need_the_true_signal_are_not_measured_on_a_channel_of_ones_own(tmp_path):
-    np.save(
-        tmp_path / "x.npy",
-        np.sin(np.arange(4_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(4_000),
-    )
-    arguments = ["--budget", "smoke", *TINY_OPTIONS, "--telemetry", tmp_path / "x.npy"]
-    assert (
-        reproduce.main(
-            [
-                str(each)
-                for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]
-            ]
-        )
-        == 0
-    )
+    noise = 0.1 * np.random.default_rng(0).standard_normal(4_000)
+    np.save(tmp_path / "x.npy", np.sin(np.arange(4_000) / 15) + noise)
+    words = f"--budget smoke --telemetry {tmp_path}/x.npy --out {tmp_path}/out --cache {tmp_path}/c"
+    assert reproduce.main([*words.split(), *TINY_OPTIONS]) == 0
     found = json.loads((tmp_path / "out" / "results.json").read_text())
-    assert {claim["id"] for claim in found["claims"] if claim["verdict"] == NOT_MEASURED} == {
-        "C3",
-        "C8",
-        "C9",
-    }
+    left = [claim["id"] for claim in found["claims"] if claim["verdict"] == NOT_MEASURED]
+    assert left == ["C3", "C8", "C9"]
 
 
 @pytest.mark.parametrize(
@@ -165,20 +156,13 @@ def test_killed_in_training_the_next_run_continues_and_finds_the_same(
     pipeline, tmp_path, stage, kept
 ):
     out, cache = tmp_path / "out", tmp_path / "cache"
-    command = [
-        sys.executable,
-        "-m",
-        "enhsim_tf.reproduce",
-        "--budget",
-        "smoke",
-        "--cache",
-        cache,
-        "--out",
-        out,
-        *TINY_OPTIONS,
-    ]
+    words = f"-m enhsim_tf.reproduce --budget smoke --cache {cache} --out {out}".split()
     process = subprocess.Popen(
-        [*map(str, command)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        [sys.executable, *words, *TINY_OPTIONS],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     )
     for line in process.stdout:
         if line.startswith(stage):

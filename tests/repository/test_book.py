@@ -2,17 +2,13 @@
 
 import re
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-import pandas as pd
 import pytest
 
 import enhsim_tf
 from book import __main__ as command
 from book import tables
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.reading.channels import Channels
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,9 +18,11 @@ def test_every_page_is_in_the_table_of_contents():
         r"\b(?:root|file|glob): (\S+)", (ROOT / "book" / "_toc.yml").read_text(encoding="utf-8")
     )
     patterns = {name for name in listed if "*" in name}
-    assert {f"docs/{page.stem}" for page in (ROOT / "docs").glob("*.md")} <= set(listed)
-    assert patterns == {"notebooks/*", "studies/*/README"}
-    assert [name for name in set(listed) - patterns if not (ROOT / f"{name}.md").is_file()] == []
+    pages = {f"docs/{page.stem}" for page in (ROOT / "docs").glob("*.md")}
+    lessons = {f"notebooks/{lesson.stem}" for lesson in (ROOT / "notebooks").glob("*.ipynb")}
+    assert pages | lessons <= set(listed) and patterns == {"studies/*/README"}
+    others = set(listed) - patterns - lessons
+    assert [name for name in others if not (ROOT / f"{name}.md").is_file()] == []
 
 
 def test_links_between_pages_lead_to_files():
@@ -33,19 +31,19 @@ def test_links_between_pages_lead_to_files():
         *(ROOT / "docs").glob("*.md"),
         *(ROOT / "studies").rglob("README.md"),
     ]
+    pattern = r"\]\((?!\w+:|#)([^)#\s]+)"
     links = [
-        (page, link)
+        page.parent / link
         for page in pages
-        for link in re.findall(r"\]\((?!\w+:|#)([^)#\s]+)", page.read_text(encoding="utf-8"))
+        for link in re.findall(pattern, page.read_text(encoding="utf-8"))
     ]
     assert len(links) > 50
-    assert [(page.name, link) for page, link in links if not (page.parent / link).exists()] == []
+    assert [link for link in links if not link.exists()] == []
 
 
 def test_the_reference_lists_the_public_names():
-    assert set(
-        re.findall(r"^   (\w+)$", (ROOT / "book" / "api.md").read_text(encoding="utf-8"), re.M)
-    ) == set(enhsim_tf.__all__)
+    names = re.findall(r"^   (\w+)$", (ROOT / "book" / "api.md").read_text("utf-8"), re.M)
+    assert set(names) == set(enhsim_tf.__all__)
 
 
 def test_missing_packages_are_named_in_one_line(monkeypatch, capsys, tmp_path):
@@ -63,11 +61,10 @@ def test_no_marked_table_is_stale():
 
 
 def test_another_processor_is_not_another_result():
-    assert tables.agree(
-        "| C1 | partly | error 0.093; 1,200 |", "| C1 | partly | error 0.106; 1,000 |"
-    )
-    assert not tables.agree("| C1 | partly | error 0.093 |", "| C1 | partly | error 0.5 |")
-    assert not tables.agree("| C1 | partly | error 0.093 |", "| C1 | reproduced | error 0.093 |")
+    row = "| C1 | partly | error 0.093; 1,200 |"
+    assert tables.agree(row, "| C1 | partly | error 0.106; 1,000 |")
+    for other in ("| C1 | partly | error 0.5; 1,200 |", row.replace("partly", "reproduced")):
+        assert not tables.agree(row, other)
 
 
 def test_a_table_stands_between_its_markers():
@@ -77,30 +74,15 @@ def test_a_table_stands_between_its_markers():
         tables.fill_part(page, "b", "new", "page.md")
 
 
-# the code of CONTRIBUTING.md
+# the summary of a job
 
 
-def test_the_examples_for_contributors_work(tmp_path):
-    names = {
-        "np": np,
-        "pd": pd,
-        "Path": Path,
-        "Any": Any,
-        "Channels": Channels,
-        "InputError": InputError,
-    }
-    for block in re.findall(
-        r"```python\n(\S.*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.S
-    ):
-        exec(block, names)
-    windows = np.array([[0.0, 1.0], [2.0, 3.0], [0.0, 4.0]])[:, :, None]
-    assert names["WindowRange"]().fit(windows).score(windows).tolist() == [0, 0, 3]
-    assert names["Ramp"](4.0).run(np.arange(6)).ravel().tolist() == [0, 0.25, 0.5, 0.75, 0, 0.25]
-    (tmp_path / "x.jsonl").write_text(
-        '{"volts": 1.5, "mode": "on"}\n{"volts": 2.5, "mode": "off"}\n'
-    )
-    (channel,) = names["read_json_lines"](tmp_path / "x.jsonl", None).values()
-    assert channel.tolist() == [1.5, 2.5]
-    (tmp_path / "bad.jsonl").write_text("{")
-    with pytest.raises(InputError):
-        names["read_json_lines"](tmp_path / "bad.jsonl", None)
+def test_the_summary_has_a_row_for_each_claim(capsys):
+    assert command.main(["--summary", str(ROOT / "figures" / "results.json")]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| C")]
+    assert [row[2:4] for row in rows] == [f"C{number}" for number in range(1, 10)]
+
+
+def test_a_run_that_wrote_no_results_has_no_summary(tmp_path, capsys):
+    assert command.main(["--summary", str(tmp_path / "results.json")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

@@ -1,4 +1,6 @@
-"""Every random draw uses a generator that is passed in, or a seed of a model or layer; none uses global state."""
+"""Every random draw uses a generator that is passed in, or a seed of a model or layer; none uses
+global state.
+"""
 
 import ast
 from pathlib import Path
@@ -24,47 +26,32 @@ SEEDED = {
 
 
 def unowned_draws(tree):
-    """Calls that draw random numbers from global state, or create a random object without a seed."""
+    """Calls that draw random numbers from global state, or create a random object without a
+    seed.
+    """
     found = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            names = (
-                [node.module or ""]
-                if isinstance(node, ast.ImportFrom)
-                else [alias.name for alias in node.names]
-            )
-            found += [f"import {name}" for name in names if name == "random"]
+        if isinstance(node, ast.Import) and any(alias.name == "random" for alias in node.names):
+            found.append("import random")
         if not isinstance(node, ast.Call):
             continue
-        name, seeded = (
-            ast.unparse(node.func),
-            any(keyword.arg == "seed" for keyword in node.keywords),
-        )
-        *path, last = name.split(".")
-        if path[-2:] in (["np", "random"], ["numpy", "random"]) and (
-            last not in OWNERS or (last == "default_rng" and not node.args)
-        ):
-            found.append(name)
-        stateless = (
-            seeded or last in ("split", "fold_in") or last.startswith("stateless_")
-        )  # the seed is an argument
-        if (path[:2] == ["tf", "random"] and not stateless) or last in (
-            "set_random_seed",
-            "set_seed",
-        ):
-            found.append(name)
-        if path[-2:] == ["keras", "random"] and not (
-            seeded or (last == "SeedGenerator" and node.args)
-        ):
-            found.append(name)
-        if path and last in SEEDED and path[0] in ("keras", "tf") and not seeded:
-            found.append(name)
+        name, keywords = ast.unparse(node.func), {keyword.arg for keyword in node.keywords}
+        module, _, last = name.rpartition(".")
+        is_seeded = "seed" in keywords or last in ("split", "fold_in", "SeedGenerator")
+        of_keras = module.startswith(("keras", "tf"))
         if (
-            last in ("Dense", "Conv1D")
-            and path[0] == "keras"
-            and not any(keyword.arg == "kernel_initializer" for keyword in node.keywords)
+            (module in ("np.random", "numpy.random") and last not in OWNERS)
+            or (last in OWNERS and not node.args)
+            or (
+                module in ("tf.random", "keras.random")
+                and not is_seeded
+                and "stateless" not in last
+            )
+            or last in ("set_random_seed", "set_seed")
+            or (last in SEEDED and of_keras and not is_seeded)
+            or (last in ("Dense", "Conv1D") and of_keras and "kernel_initializer" not in keywords)
         ):
-            found.append(f"{name} without kernel_initializer")
+            found.append(name)
     return found
 
 

@@ -1,4 +1,6 @@
-"""Lessons: each notebook is its source, executed at full budget; each lesson runs, and its solutions are right."""
+"""Lessons: each notebook is its source, executed at full budget; each lesson runs, and its
+solutions are right.
+"""
 
 import ast
 import re
@@ -8,6 +10,7 @@ import sys
 import nbformat
 import pytest
 
+from enhsim_tf.common.errors import InputError
 from notebooks import build
 from notebooks.lesson_tools import CLAIMS, FIGURES, NOT_ANSWERED, RIGHT, ROOT, SMOKE
 
@@ -20,7 +23,7 @@ def code_of(source):
     return [cell.source for cell in build.read(source).cells if cell.cell_type == "code"]
 
 
-# -- never stale -------------------------------------------------------------------------------------------------------------
+# -- never stale ---------------------------------------------------------------------------------
 
 
 @each_lesson
@@ -77,7 +80,7 @@ def test_a_notebook_that_is_not_its_source_executed_is_found(tiny, change, fault
     assert build.faults(tiny) == ["there is no notebook"]
 
 
-# -- executed ----------------------------------------------------------------------------------------------------------------
+# -- executed ------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -102,28 +105,25 @@ def test_a_lesson_runs_and_its_solutions_are_right(source, cache):
     checks = [
         cell for cell in notebook.cells if cell.cell_type == "code" and build.CHECK in cell.source
     ]
-    said = {cell.metadata.get("solved", False): set() for cell in checks}
+    said = {}
     for cell in checks:
-        said[cell.metadata.get("solved", False)].add(
-            "".join(output.text for output in cell.outputs).strip()
-        )
+        text = "".join(output.text for output in cell.outputs).strip()
+        said.setdefault(cell.metadata.get("solved", False), set()).add(text)
     assert said == {False: {NOT_ANSWERED}, True: {RIGHT}}
 
 
-# -- for students, and outside a clone ---------------------------------------------------------------------------------------
+# -- for students, and outside a clone -----------------------------------------------------------
 
 ADDRESS = "https://github.com/someone/something"
 
 
 @each_lesson
-def test_a_lesson_for_students_has_every_check_and_no_solution(source):
-    notebook = build.keep_outputs(source)
-    checks = [cell.source for cell in notebook.cells if build.CHECK in cell.source]
-    solutions = [code for cell in notebook.cells for code in build.SOLUTION.findall(cell.source)]
-    build.drop_solutions(notebook)
-    left = "\n".join(cell.source for cell in notebook.cells)
-    assert solutions and not any(code in left for code in solutions)
-    assert [cell.source for cell in notebook.cells if build.CHECK in cell.source] == checks
+def test_each_check_has_a_solution_and_no_lesson_holds_it(source):
+    cells = build.read(source).cells
+    checks = [cell for cell in cells if cell.cell_type == "code" and build.CHECK in cell.source]
+    solutions, lesson = build.solutions_of(source), "\n".join(cell.source for cell in cells)
+    assert len(checks) == len(solutions) > 0
+    assert "<details>" not in lesson and not any(code.strip() in lesson for code in solutions)
 
 
 def test_outputs_are_kept_only_if_no_code_has_changed(tiny):
@@ -142,21 +142,22 @@ def test_outputs_are_kept_only_if_no_code_has_changed(tiny):
         build.keep_outputs(tiny)
 
 
-def test_badges_and_set_up_are_there_with_an_address_and_not_without(tiny, monkeypatch):
-    monkeypatch.setattr(build, "published_at", lambda: None)
-    without = build.keep_outputs(tiny)
-    monkeypatch.setattr(build, "published_at", lambda: ADDRESS)
-    published = build.keep_outputs(tiny)
+def test_badges_and_set_up_are_there_with_an_address_and_not_without(tiny):
+    without, published = build.keep_outputs(tiny), build.keep_outputs(tiny, ADDRESS)
     assert [cell.source for cell in without.cells] == ["# Tiny", 'open_study("battery")']
     title, set_up, code = (cell.source for cell in published.cells)
-    assert (
-        "colab.research.google.com/github/someone/something/blob/main/notebooks/99_tiny.ipynb"
-        in title
-    )
-    assert "mybinder.org/v2/gh/someone/something/main" in title
+    place = "github/someone/something/blob/lessons/notebooks/99_tiny.ipynb"
+    assert f"colab.research.google.com/{place}" in title
+    assert "mybinder.org/v2/gh/someone/something/HEAD" in title
     assert ADDRESS in set_up and code == without.cells[1].source
-    nbformat.write(published, tiny.with_suffix(".ipynb"))
-    assert build.faults(tiny) == []
+
+
+@pytest.mark.parametrize(
+    "address", ["someone/something", "https://example.org/a/b", "https://github.com/a"]
+)
+def test_an_address_elsewhere_is_refused(tiny, address):
+    with pytest.raises(InputError, match="https://github.com/OWNER/NAME"):
+        build.keep_outputs(tiny, address)
 
 
 def test_the_set_up_fetches_a_clone_and_starts_in_its_lessons(tmp_path):
@@ -172,7 +173,10 @@ def test_the_set_up_fetches_a_clone_and_starts_in_its_lessons(tmp_path):
     ):
         subprocess.run(["git", *command], cwd=clone, check=True)
     code = build.SET_UP_CODE.format(address=clone.as_uri())
-    twice = f"{code}\nimport lesson_tools\n{code}\nprint(lesson_tools.found, os.path.basename(os.getcwd()))"
+    twice = (
+        f"{code}\nimport lesson_tools\n{code}\nprint(lesson_tools.found, "
+        "os.path.basename(os.getcwd()))"
+    )
     for _ in range(2):  # a kernel that starts again finds the clone there
         done = subprocess.run(
             [sys.executable, "-c", twice], cwd=elsewhere, check=True, capture_output=True, text=True
@@ -180,14 +184,15 @@ def test_the_set_up_fetches_a_clone_and_starts_in_its_lessons(tmp_path):
         assert done.stdout.strip().endswith("True notebooks")
 
 
-def test_slides_hold_their_pictures(tmp_path):
+def test_slides_hold_their_pictures_and_need_no_network(tmp_path):
     build.build_slides(tmp_path / "slides.html")
     page = (tmp_path / "slides.html").read_text(encoding="utf-8")
     shown = re.findall(r"!\[", (build.FOLDER / "slides.py").read_text(encoding="utf-8"))
     assert page.count('src="data:image/png;base64,') == len(shown) > 10
+    assert not re.search(r'(src|href)="https?:', page) and "<link" not in page
 
 
-# -- what they hold ----------------------------------------------------------------------------------------------------------
+# -- what they hold ------------------------------------------------------------------------------
 
 
 @each_lesson
@@ -211,34 +216,24 @@ def test_a_claim_has_the_same_verdict_and_numbers_in_every_lesson():
                 text = output.get("data", {}).get("text/markdown", "")
                 if found := re.match(r"> \*\*(C\d): (.*?)\.\*\*", text):
                     verdicts.setdefault(found[1], set()).add(found[2])
-                    if limits := text[found.end() :].strip():  # a lesson may leave them out
-                        numbers.setdefault(found[1], set()).add(
-                            tuple(re.findall(r"\d[\d,.]*", limits))
-                        )
+                    if limits := re.findall(r"\d[\d,.]*", text[found.end() :]):
+                        # a lesson may leave them out
+                        numbers.setdefault(found[1], set()).add(tuple(limits))
     assert len(verdicts) == 9
     assert all(len(each) == 1 for each in (*verdicts.values(), *numbers.values()))
 
 
 def test_every_figure_and_every_claim_of_the_paper_is_taught():
     everything = "\n".join(code for source in SOURCES for code in code_of(source))
-    figures = [
-        name for name in FIGURES if FIGURES[name].number < 14
-    ]  # the paper commented out number 14
-    assert [
-        name
-        for name in (*figures, *(claim.id for claim in CLAIMS))
-        if f'"{name}"' not in everything
-    ] == []
+    names = [*FIGURES, *(claim.id for claim in CLAIMS)]
+    assert [name for name in names if f'"{name}"' not in everything] == []
 
 
 @each_lesson
 def test_pictures_that_the_prose_shows_are_there(source):
     text = "\n".join(cell.source for cell in build.read(source).cells)
-    assert [
-        name
-        for name in re.findall(r"!\[[^]]+\]\((.*?)\)", text)
-        if not (build.FOLDER / name).is_file()
-    ] == []
+    names = re.findall(r"!\[[^]]+\]\((.*?)\)", text)
+    assert [name for name in names if not (build.FOLDER / name).is_file()] == []
 
 
 @each_lesson

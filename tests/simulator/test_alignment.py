@@ -1,14 +1,21 @@
 import dataclasses
+import inspect
+import re
 
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse.alignment import Paired
+from enhsim_tf.coarse.degraded import Degraded
+from enhsim_tf.coarse.runs import Runs
+from enhsim_tf.coarse.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse.waves import Waves
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.simulator.alignment import Runs, Waves
-from tests.simulator.conftest import coarse_run
+from enhsim_tf.fitting import fitted, report
+from enhsim_tf.simulator import simulator
+from enhsim_tf.telemetry.series import Clock, Part
+from tests.fitted_simulators import coarse_run
+from tests.known_simulators import parts_of
 
 START = "2024-01-01T00:00:00+00:00"
 PLACES = np.arange(200)
@@ -24,16 +31,33 @@ def waves():
     )
 
 
+def methods_of(kind):
+    return {
+        name: list(inspect.signature(method).parameters)
+        for name, method in vars(kind).items()
+        if inspect.isfunction(method) and not name.startswith("_")
+    }
+
+
+def test_waves_and_runs_answer_the_same_questions():
+    waves = methods_of(Waves)
+    runs = methods_of(Runs)
+    asked = {
+        name
+        for module in (simulator, fitted, report)
+        for name in re.findall(r"alignment\.(\w+)\(", inspect.getsource(module))
+    }
+    assert asked > {"pair", "draw", "clean_series"} and asked <= waves.keys() & runs.keys()
+    assert runs == {name: waves[name] for name in runs}
+
+
 def square(places):
     return np.where(places % 40 < 20, 1.0, -1.0)
 
 
 def test_phase_offset_and_gain_of_windows_are_recovered(waves):
-    starts, shift, gain = (
-        np.array([3, 11, 30]),
-        np.array([10.0, -2.0, 0.5]),
-        np.array([2.0, 1.0, 5.0]),
-    )
+    starts = np.array([3, 11, 30])
+    shift, gain = np.array([[10.0, -2.0, 0.5], [2.0, 1.0, 5.0]])
     wave = square(starts[:, None] + np.arange(80))
     targets = np.stack(
         [shift[:, None] + gain[:, None] * wave, np.full((3, 80), 4.0)], axis=2
@@ -42,10 +66,11 @@ def test_phase_offset_and_gain_of_windows_are_recovered(waves):
     np.testing.assert_array_equal(coarse[:, :, 0], wave)
     np.testing.assert_allclose(found_shift, np.stack([shift, np.full(3, 4.0)], axis=1), atol=1e-5)
     np.testing.assert_allclose(found_gain, np.stack([gain, np.full(3, 2.0)], axis=1), atol=1e-5)
+    # the wave's amplitude is 1
     assert waves.is_flat(np.array([[0.09, 2.0], [0.11, 2.0]])).tolist() == [
         [True, False],
         [False, False],
-    ]  # the wave's amplitude is 1
+    ]
 
 
 def test_the_phase_of_short_pulses_is_found_although_some_windows_have_none():
@@ -65,27 +90,24 @@ def test_enhanced_waveforms_find_the_phase(waves):
     np.testing.assert_array_equal(coarse[:, :, 0], waves.phases(0)[[10, 130]])
 
 
-@pytest.mark.parametrize(
-    ("period", "expected"), [(40.2, 40.0), (41.0, 41.0)]
-)  # two per cent apart they keep their clocks
+# two per cent apart they keep their clocks
+@pytest.mark.parametrize(("period", "expected"), [(40.2, 40.0), (41.0, 41.0)])
 def test_nearly_equal_periods_become_one_clock_at_the_distance_of_the_telemetry(period, expected):
     first, second = (
         SquareWaveSimulator([SquareWave(each, phase)])
         for each, phase in ((40.0, 0.1), (period, 0.9))
     )
     times = np.arange(0, 4_000, 37)[:, None] + np.arange(80)
+    # a quarter of a period apart
     targets = np.stack([SquareWave(40.0, phase)(times) for phase in (0.3, 0.55)], axis=2).astype(
         np.float32
-    )  # a quarter of a period apart
-    found = [
-        each.waves[0]
-        for each in Waves([first, second], ("a", "b"), 1.0, 80).on_one_clock(targets).simulators
-    ]
+    )
+    waves = Waves([first, second], ("a", "b"), 1.0, 80).on_one_clock(targets)
+    found = [simulator.waves[0] for simulator in waves.simulators]
     assert [each.period_s for each in found] == [40.0, expected]
     if expected == 40.0:
-        assert np.mod(found[1].phase - found[0].phase, 1.0) == pytest.approx(
-            0.25, abs=0.0125
-        )  # half a sample
+        # half a sample
+        assert np.mod(found[1].phase - found[0].phase, 1.0) == pytest.approx(0.25, abs=0.0125)
 
 
 def test_waves_are_drawn_in_their_unit_and_a_scenario_may_concern_one_channel(waves):
@@ -96,14 +118,14 @@ def test_waves_are_drawn_in_their_unit_and_a_scenario_may_concern_one_channel(wa
     found = waves.draw(
         starts, [None, Degraded("stuck", 1.0, 0.25, "b"), Degraded("drift", 1.0, 0.0, "b")], rng
     )
+    # a level stands anyway
     assert (found.coarse != found.nominal).any(axis=1).tolist() == [
         [False, False],
         [False, False],
         [False, True],
-    ]  # a level stands anyway
-    assert found.coarse[2, -1, 1] == pytest.approx(
-        2.0
-    )  # the whole range of a level of spread 2, in units of the spread
+    ]
+    # the whole range of a level of spread 2, in units of the spread
+    assert found.coarse[2, -1, 1] == pytest.approx(2.0)
     assert (found.held != np.arange(80)[:, None]).sum(axis=1).tolist() == [[0, 0], [0, 59], [0, 0]]
     with pytest.raises(InputError, match="one of: a, b"):
         waves.draw(np.array([0]), [Degraded("drift", 1.0, 0.0, "c")], rng)
@@ -125,25 +147,30 @@ def test_each_part_of_telemetry_meets_the_run_of_its_own_time():
     first, second = (
         np.random.default_rng(seed).standard_normal((100, 1)).astype(np.float32) for seed in (0, 1)
     )
-    telemetry = Recording((Run(first, 0.0), Run(second, 1_500.0)), ("a",), 10.0, START)
+    telemetry = parts_of((Part(first, 0.0), Part(second, 1_500.0)), ("a",), 10.0, START)
     values = coarse_run(300).parts[0].values
-    late = dataclasses.replace(coarse_run(300), parts=(Run(values[50:], 500.0),))
-    found, coarse = Runs(coarse_run(), 40, delay_s=20.0).pair(telemetry, late)
+    late = dataclasses.replace(coarse_run(300), parts=(Part(values[50:], 500.0),))
+    paired = Runs(coarse_run(), ["a"], 40, delay_s=20.0).pair(telemetry, late)
+    found, coarse = paired.telemetry, paired.run
+    assert paired.places_in(telemetry) == [52, 100]
     for part, expected in zip(found.parts, (first[52:], second), strict=True):
         np.testing.assert_array_equal(part.values, expected)
     for part, expected in zip(coarse.parts, (values[50:98], values[148:248]), strict=True):
         np.testing.assert_allclose(part.values, expected, atol=1e-6)
-    assert (
-        [part.offset_s for part in found.parts]
-        == [part.offset_s for part in coarse.parts]
-        == [520.0, 1_500.0]
-    )
+    for telemetry in (found, coarse):
+        assert [part.offset_s for part in telemetry.parts] == [520.0, 1_500.0]
+
+
+def test_parts_between_two_samples_of_the_clock_keep_their_places():
+    telemetry = parts_of((Part(np.zeros((20, 1), np.float32), 10.5),), ("a",))
+    late = dataclasses.replace(telemetry, parts=(Part(np.zeros((17, 1), np.float32), 13.5),))
+    assert Paired(late).places_in(telemetry) == [3]
 
 
 def test_a_run_of_another_rate_or_without_a_window_is_refused():
-    runs = Runs(coarse_run(), 80)
+    runs = Runs(coarse_run(), ["a"], 80)
     with pytest.raises(InputError, match="sample every 10 s"):
-        runs.usable(dataclasses.replace(coarse_run(), interval_s=5.0))
+        runs.usable(dataclasses.replace(coarse_run(), clock=Clock.of(5.0, coarse_run().start)))
     with pytest.raises(InputError, match="at least one window of 80"):
         runs.usable(coarse_run(79))
     with pytest.raises(InputError, match="recorded run of the scenario"):
@@ -152,9 +179,6 @@ def test_a_run_of_another_rate_or_without_a_window_is_refused():
 
 def test_windows_of_a_run_begin_again_after_the_last():
     values = coarse_run(100).parts[0].values
-    drawn = Runs(coarse_run(100), 80).draw(
-        np.array([0, 20, 21, 43]), [None] * 4, np.random.default_rng(0)
-    )
-    np.testing.assert_array_equal(
-        drawn.coarse, [values[:80], values[20:], values[:80], values[1:81]]
-    )
+    runs, starts = Runs(coarse_run(100), ["a"], 80), np.array([0, 20, 21, 43])
+    drawn = runs.draw(starts, [None] * 4, np.random.default_rng(0)).coarse
+    np.testing.assert_array_equal(drawn, [values[:80], values[20:], values[:80], values[1:81]])

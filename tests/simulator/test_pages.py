@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.__main__ import main
+
 TESTS = Path(__file__).parents[1]
 PAGE = (TESTS.parent / "docs" / "own_simulator.md").read_text(encoding="utf-8")
 BLOCKS = [part.partition("```")[0] for part in PAGE.split("```python")[1:]]
@@ -47,7 +49,7 @@ def test_the_example_with_a_function_runs(folder):
 def test_the_example_with_an_fmu_runs(folder):
     pytest.importorskip("fmpy", reason="the extra fmi is not installed")
     builder = pytest.importorskip("pythonfmu.builder", reason="pythonfmu is not installed")
-    builder.FmuBuilder.build_FMU(TESTS / "coarse_simulator" / "heater_fmu.py", dest=folder)
+    builder.FmuBuilder.build_FMU(TESTS / "coarse" / "heater_fmu.py", dest=folder)
     command = (np.sin(np.arange(300) / 15) > 0).astype(int)
     pd.DataFrame(
         {"time": pd.date_range("2024-01-01", periods=300, freq="10s"), "command": command}
@@ -57,3 +59,22 @@ def test_the_example_with_an_fmu_runs(folder):
     nominal, weak = (made[name].parts[0].values for name in ("nominal", "weak"))
     np.testing.assert_allclose(weak[:, 0], 0.5 * nominal[:, 0])
     assert nominal[:, 1].max() > weak[:, 1].max() + 5
+
+
+def test_the_files_of_a_family_become_one_model(folder, capsys):
+    rng = np.random.default_rng(1)
+    for kind in ("telemetry", "runs"):
+        Path("recorded", kind).mkdir(parents=True)
+    for name in ("first", "second"):
+        watts = np.convolve(rng.standard_normal(1_500), np.hanning(20), "same")
+        celsius = 20 + watts + 0.1 * rng.standard_normal(1_500)
+        for kind, column, values in (("telemetry", "celsius", celsius), ("runs", "watts", watts)):
+            table = pd.DataFrame({"time": np.arange(1_500) * 10, column: values})
+            table.to_csv(Path("recorded", kind, f"{name}.csv"), index=False)
+    arguments = "--delay 0 --window 64 --num-windows 200 --enhancer ridge --out family_model"
+    fit = f"fit {{0}}/telemetry --coarse {{0}}/runs {arguments}"
+    assert main(fit.format("recorded").split()) == 2
+    assert "over the same times" in capsys.readouterr().err
+    exec(BLOCKS[3], {})
+    assert main(fit.format("family").split()) == 0
+    assert "3,000 samples in 2 parts" in capsys.readouterr().out

@@ -1,14 +1,19 @@
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse.alignment import Drawn
+from enhsim_tf.coarse.degraded import Degraded
+from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.fitting.fit import fit
 from enhsim_tf.simulator import simulator as module
+from enhsim_tf.simulator.changes import put_changes
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.placing import PlacedEvent
-from tests.known_simulators import of_waves
-from tests.simulator.conftest import WINDOW, coarse_run, smooth_wave
+from enhsim_tf.telemetry.series import Part
+from tests.fitted_simulators import WINDOW, coarse_run, smooth_wave
+from tests.known_simulators import of_waves, parts_of
 
 
 def test_windows_have_the_shape_level_and_noise_of_the_telemetry(single):
@@ -33,9 +38,8 @@ def test_samples_that_are_not_marked_are_those_of_the_nominal_windows(both, mode
 
 def test_a_series_has_no_seams(single):
     steps = np.abs(np.diff(single[0].generate_series(5_000, seed=1)[:, 0]))
-    assert (
-        steps.max() < 2 * 2 / 9 + 6 * np.sqrt(2) * 0.1
-    )  # the steepest flank, and six standard deviations of two noises
+    # the steepest flank, and six standard deviations of two noises
+    assert steps.max() < 2 * 2 / 9 + 6 * np.sqrt(2) * 0.1
 
 
 SCHEDULE = [PlacedEvent("drift", 1.0, 300, 200), PlacedEvent("gain_loss", 1.0, 900, 100)]
@@ -45,20 +49,34 @@ def test_events_of_a_series_are_where_the_mask_is(single):
     values, mask, events = single[0].generate_labelled_series(1_500, seed=0, schedule=SCHEDULE)
     nominal, fade = single[0].generate_series(1_500, seed=0), WINDOW // 16
     np.testing.assert_array_equal(values[~mask], nominal[~mask])
-    for event, (mode, severity, begin, end) in zip(SCHEDULE, events, strict=True):
-        assert (mode, severity) == (
-            event.kind,
-            1.0,
-        ) and event.begin - fade <= begin < end <= event.end + fade
+    for event, changed in zip(SCHEDULE, events, strict=True):
+        assert (changed.kind, changed.severity) == (event.kind, 1.0)
+        assert event.begin - fade <= changed.begin < changed.end <= event.end + fade
     assert not mask[550:850].any()
+
+
+def test_a_neighbour_does_not_change_the_end_of_an_event():
+    nominal = np.zeros((1, 400, 1), np.float32)
+    coarse = nominal.copy()
+    coarse[0, [*range(100, 200), *range(201, 300)]] = 1
+    drawn = Drawn(coarse, nominal, np.arange(400)[None, :, None])
+    spans = [(100, 200), (201, 300)]
+    runs, _ = put_changes(nominal, nominal + 1, drawn, spans, 496, np.zeros(1))
+    assert (runs[coarse == 1] == 1).all()
+    assert runs[0, 200, 0] == pytest.approx(0.5 + 0.5 * np.cos(np.pi / 32))  # first of the fade
+
+
+def test_an_event_of_one_channel_changes_that_channel_alone(both):
+    event = PlacedEvent("drift", 1.0, 300, 200, "watts")
+    _, mask, events = both[0].generate_labelled_series(1_000, schedule=[event])
+    assert mask.any(axis=0).tolist() == [False, True]
+    assert [(each.kind, each.channel) for each in events] == [("drift", "watts")]
 
 
 def test_a_stuck_channel_stands_still_but_for_its_noise(single):
     values, mask, _ = single[0].generate_labelled_series(1_000, Degraded("stuck", 1.0, 0.5), seed=0)
-    assert (
-        np.std(values[520:, 0]) == pytest.approx(single[0].noise_sd[0], rel=0.1)
-        and not mask[:490].any()
-    )
+    assert np.std(values[520:, 0]) == pytest.approx(single[0].noise_sd[0], rel=0.1)
+    assert not mask[:490].any()
 
 
 @pytest.mark.parametrize("kind", ["single", "both", "of_run"])
@@ -71,6 +89,8 @@ def test_a_loaded_simulator_generates_the_same(kind, request, tmp_path):
         loaded.generate_series(300, seed=1), simulator.generate_series(300, seed=1)
     )
     assert loaded.trained == simulator.trained and loaded.channels == simulator.channels
+    np.testing.assert_array_equal(loaded.noise_sd, simulator.noise_sd)
+    np.testing.assert_array_equal(loaded.scale, simulator.scale)
 
 
 def test_copies_of_a_run_differ_by_their_noise_alone(of_run):
@@ -92,6 +112,8 @@ def test_copies_of_a_run_differ_by_their_noise_alone(of_run):
         (r"\(windows, 80, 1\)", lambda simulator: simulator.enhance(np.zeros((3, 81, 1)))),
         ("whole number", lambda simulator: simulator.generate(-1)),
         ("whole number", lambda simulator: simulator.generate_series(2.5)),
+        ("seed=None", lambda simulator: simulator.generate(2, seed=None)),
+        ("seed=-1", lambda simulator: simulator.generate_series(90, seed=-1)),
         ("one of square waves", lambda simulator: next(simulator.generate_copies(coarse_run(), 1))),
         (
             "or a schedule",
@@ -125,3 +147,19 @@ def test_generated_windows_do_not_depend_on_the_chunks(mode, monkeypatch):
             whole, simulator.generate(23, seed=5, with_noise=False) + noise, atol=1e-6
         )
     assert np.abs(whole - simulator.generate(23, scenario, seed=6)).max() > 0.01
+
+
+def test_generated_channels_follow_each_other_as_the_real_ones_do():
+    """The second channel follows a process of the first one fifteen samples later."""
+    rng = np.random.default_rng(0)
+    common = lfilter([0.6], [1.0, -0.8], rng.standard_normal(6_115))[100:]
+    values = 0.4 * np.stack([common[15:], common[:-15]], axis=1)
+    values += 0.15 * rng.standard_normal(values.shape)
+    waves = np.sin(2 * np.pi * np.arange(6_000)[:, None] / 90 + [0.0, 1.0])
+    part = Part((waves + values).astype(np.float32))
+    simulator, _ = fit(parts_of((part,), ("a", "b"), name="pair"))
+    clean = simulator.generate(1_000, seed=1, with_noise=False)
+    noise = simulator.draw_noise(clean, np.random.default_rng(4))
+    first, second = noise[:, :-15, 0].ravel(), noise[:, 15:, 1].ravel()
+    # of the variance 0.16 + 0.0225 of each the process has 0.16
+    assert np.corrcoef(first, second)[0, 1] == pytest.approx(0.16 / 0.1825, abs=0.05)

@@ -1,4 +1,6 @@
-"""The whole path of studies at smoke budget: one kind of noise, one seed, narrow networks and two detectors."""
+"""The whole path of studies at smoke budget: one kind of noise, one seed, narrow networks and two
+detectors.
+"""
 
 import argparse
 import importlib
@@ -7,7 +9,7 @@ import json
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import MODES
+from enhsim_tf.coarse.degraded import MODES
 from studies.common.controls import CONTROLS
 from studies.common.detectors import DETECTORS
 from studies.common.settings import make_settings
@@ -20,15 +22,13 @@ from studies.robustness.degraded_modes import METHODS, SEVERITIES
 SMALL = {
     "paper__window": 64,
     "paper__num_windows": 40,
-    "paper__iterations": 1,
+    "paper__iterations": 2,
     "paper__record_every": 1,
     "paper__hidden_units": 64,
 }
 SMALL |= {"robustness__num_windows": 60, "robustness__num_seeds": 1, "modes__num_learnt": 90}
-JUDGED, MODELS = (
-    2 * len(replicate.ARMS) + len(CONTROLS),
-    len(cells.MODELS),
-)  # controls on real windows only
+# controls on real windows only
+JUDGED, MODELS = 2 * len(replicate.ARMS) + len(CONTROLS), len(cells.MODELS)
 ROWS = {
     "robustness": {
         "alarms": 10 * JUDGED,
@@ -36,9 +36,8 @@ ROWS = {
         "degraded": len(METHODS) * (1 + len(MODES) * len(SEVERITIES)),
     },
     "noise_models": {"detectors": 2 * (1 + MODELS), "realism": len(MEASURES) * (1 + MODELS)},
-    "few_windows": {
-        "rows": 2 * 5 * len(QUICK)
-    },  # numbers of windows, kinds of training data, detectors
+    # numbers of windows, kinds of training data, detectors
+    "few_windows": {"rows": 2 * 5 * len(QUICK)},
 }
 
 
@@ -52,29 +51,21 @@ def test_every_table_has_every_row_and_a_second_run_trains_nothing(
         monkeypatch.setattr(
             module, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")}
         )
-    run, kept = (
-        importlib.import_module(f"studies.{study}.__main__").run,
-        importlib.import_module(f"studies.{study}.summary").KEPT,
-    )
-    options, settings = (
-        argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False),
-        make_settings("smoke", **SMALL),
-    )
+    run = importlib.import_module(f"studies.{study}.__main__").run
+    kept = importlib.import_module(f"studies.{study}.summary").KEPT
+    options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
+    settings = make_settings("smoke", **SMALL)
     first = run(options, settings, tmp_path)
     assert {name: len(table) for name, table in kept.read(tmp_path).items()} == ROWS[study]
-    assert (
-        first["budget"] == "smoke"
-        and json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == first
-    )
-    assert all(
-        'id="watermark"' in figure.read_text(encoding="utf-8") for figure in tmp_path.glob("*.svg")
-    )
-    if (
-        study == "robustness"
-    ):  # of two sines of amplitudes a the square waves miss sqrt(1.5 - 4 / pi) a each; the signal is a / sqrt(2)
-        assert first["modes"]["nrmse"]["coarse"]["nominal"] == pytest.approx(
-            np.sqrt(3 - 8 / np.pi), rel=0.1
-        )
+    assert first["budget"] == "smoke"
+    assert json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == first
+    for figure in tmp_path.glob("*.svg"):
+        assert 'id="watermark"' in figure.read_text(encoding="utf-8")
+    # of two sines of amplitudes a the square waves miss sqrt(1.5 - 4 / pi) a each; the signal is a
+    # / sqrt(2)
+    if study == "robustness":
+        errors = first["modes"]["nrmse"]["coarse"]
+        assert errors["nominal"] == pytest.approx(np.sqrt(3 - 8 / np.pi), rel=0.1)
     capsys.readouterr()
     assert run(options, settings, tmp_path) == first
     assert " ...\n" not in capsys.readouterr().out

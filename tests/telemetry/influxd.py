@@ -1,4 +1,6 @@
-"""A real InfluxDB 2 server for the tests, on the loopback interface with a temporary folder. Tests can kill and restart it."""
+"""A real InfluxDB 2 server for the tests, on the loopback interface with a temporary folder. Tests
+can kill and restart it.
+"""
 
 import contextlib
 import os
@@ -10,11 +12,16 @@ import time
 import urllib.request
 from pathlib import Path
 
-WITHOUT = "no InfluxDB 2 server: put influxd on the PATH or name it in ENHSIM_TF_INFLUXD (.ci/influxd/build makes one)"
+WITHOUT = (
+    "no InfluxDB 2 server: put influxd on the PATH or name it in ENHSIM_TF_INFLUXD "
+    "(.ci/influxd/build makes one)"
+)
 
 
 def find_influxd():
-    """Path of the influxd program: the configured one, one on the PATH, or the build of `.ci/influxd/build`; None if missing."""
+    """Path of the influxd program: the configured one, one on the PATH, or the build of
+    `.ci/influxd/build`; None if missing.
+    """
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "enhsim_tf"
     places = [
         os.environ.get("ENHSIM_TF_INFLUXD"),
@@ -25,7 +32,9 @@ def find_influxd():
 
 
 class Server:
-    """A server started by the tests: its URL, organisation and token, and methods to start, kill and end it."""
+    """A server started by the tests: its URL, organisation and token, and methods to start, kill
+    and end it.
+    """
 
     def __init__(self, program, folder):
         from influxdb_client import InfluxDBClient, OnboardingRequest, SetupService

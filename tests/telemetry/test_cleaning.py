@@ -1,4 +1,6 @@
-"""Tests of cleaning: a known series is damaged in a known way, and is either repaired as stated or refused in one line."""
+"""Tests of cleaning: a known series is damaged in a known way, and is either repaired as stated or
+refused in one line.
+"""
 
 import datetime
 import decimal
@@ -11,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.datasets.anomalies import estimate_noise_sd
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.regular_grid import find_interval
@@ -33,7 +36,9 @@ CLEAN = pd.Series(VALUES, index=TIMES, name="volts")
 
 
 def check_balance(cleaned):
-    """Checks that every row and sample is accounted for, and that the parts are regular, finite and in chronological order."""
+    """Checks that every row and sample is accounted for, and that the parts are regular, finite and
+    in chronological order.
+    """
     report = cleaned.report
     assert report.rows_in == report.rows_used + report.rows_left_out
     assert (
@@ -48,7 +53,7 @@ def check_balance(cleaned):
     assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["rows_in"] == report.rows_in
     ends = -np.inf
     for part in cleaned.parts:
-        assert part.values.dtype == np.float32 and np.isfinite(part.values).all()
+        assert part.values[:, 0].dtype == np.float32 and np.isfinite(part.values[:, 0]).all()
         assert (part.interval_s, part.start) == (
             cleaned.parts[0].interval_s,
             cleaned.parts[0].start,
@@ -73,7 +78,7 @@ def as_one(cleaned, values=VALUES, off=1e-6, begin_off=0.0):
     (part,) = cleaned.parts
     assert part.interval_s == pytest.approx(1.0, abs=1e-9)
     assert abs((pd.Timestamp(part.start) - START).total_seconds()) <= begin_off
-    np.testing.assert_allclose(part.values, values, atol=off)
+    np.testing.assert_allclose(part.values[:, 0], values, atol=off)
     return part
 
 
@@ -94,9 +99,8 @@ def linear(rows, values=VALUES):
 
 
 RNG = np.random.default_rng(1)
-JITTER = pd.to_timedelta(
-    np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s"
-)  # most times are undamaged
+# most times are undamaged
+JITTER = pd.to_timedelta(np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")
 SHUFFLED = RNG.permutation(N)
 NANOSECONDS = TIMES.as_unit("ns").asi8
 ISO, ONE_MORE = TIMES.astype(str).to_numpy(object), np.insert(VALUES, 30, 7)
@@ -250,12 +254,12 @@ BAD_VALUES = {
 }
 BAD_TIMES = {
     "words": (with_times(["noon"] * N), "'noon' at row 0 of the times of volts (400 in all)"),
-    "days with two-digit years": (with_times(TIMES.strftime("%d/%m/%y %H:%M:%S")), "time_format"),
+    "days with two-digit years": (with_times(TIMES.strftime("%d/%m/%y %H:%M:%S")), "--time-format"),
     "dates as numbers": (
         with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)),
-        "time_format '%Y%m%d'",
+        "--time-format %Y%m%d",
     ),
-    "numbers of no unit": (with_times(np.arange(N) + 10**10), "time_format"),
+    "numbers of no unit": (with_times(np.arange(N) + 10**10), "--time-format ms"),
     "numbers, text and dates": (
         with_times(
             pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)
@@ -279,7 +283,7 @@ BAD_TIMES = {
     "none at all": (with_times(pd.DatetimeIndex([pd.NaT] * N)), "Received: none"),
     "at random": (
         with_times(TIMES[0] + pd.to_timedelta(np.cumsum(RNG.exponential(size=N)), unit="s")),
-        "interval_s",
+        "--interval 0.739",
     ),
     "a local clock set back": (
         with_times(
@@ -287,7 +291,7 @@ BAD_TIMES = {
             .tz_convert("Europe/Berlin")
             .tz_localize(None)
         ),
-        "timezone (--timezone Europe/Berlin",
+        "--timezone UTC, or the zone of the clock",
     ),
 }
 REFUSED = BAD_VALUES | {f"times: {name}": case for name, case in BAD_TIMES.items()}
@@ -318,7 +322,9 @@ def test_numbers_of_other_programs_by_hand(cell, number):
 
 
 def test_the_interval_is_that_of_the_long_run_before_a_jump_of_the_clock():
-    """A jump of 0.4 intervals hides in rounded steps; a line through all rows would have another slope."""
+    """A jump of 0.4 intervals hides in rounded steps; a line through all rows would have another
+    slope.
+    """
     times = 1.1 * np.arange(N) + np.where(np.arange(N) < 300, 0, 0.45)
     jittered = START + pd.to_timedelta(times + 0.01 * np.sin(np.arange(N)), unit="s")
     assert cleaned_of(with_times(jittered)).report.interval_s == pytest.approx(1.1, abs=2e-5)
@@ -337,6 +343,8 @@ def test_options_out_of_range_are_refused(refused, name):
 def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused):
     with refused("'Mars/Gale'"):
         clean(CLEAN.tz_localize(None), Cleaning(timezone="Mars/Gale"))
+    with refused("timezone=''"):
+        clean(CLEAN.tz_localize(None), Cleaning(timezone=""))
     with refused("interval_s (--interval)"):
         clean(VALUES, Cleaning(interval_s=2))
 
@@ -429,13 +437,13 @@ GAP = np.arange(100, 106)
 def test_a_gap_of_more_than_max_fill_splits_the_series(series):
     cleaned = cleaned_of(series)
     before, after = cleaned.parts
-    np.testing.assert_array_equal(before.values, VALUES[:100].astype(np.float32))
-    np.testing.assert_array_equal(after.values, VALUES[106:].astype(np.float32))
+    np.testing.assert_array_equal(before.values[:, 0], VALUES[:100].astype(np.float32))
+    np.testing.assert_array_equal(after.values[:, 0], VALUES[106:].astype(np.float32))
     assert (before.offset_s, after.offset_s, after.start) == (
         0,
         106,
         before.start,
-    ) and cleaned.longest is after
+    ) and len(cleaned.longest) == len(after)
     found = cleaned.report.find("gaps")
     assert (found.count, found.details["longest"]) == (
         1,
@@ -472,15 +480,16 @@ def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row():
     held = cleaned_of(series, interval_s=1.0, fill="hold")
     expected = np.concatenate([[1.0] * 7, [2.0], [2.5] * 22, [0.0], [4.0] * 59, [5.0]])
     (part,) = held.parts
-    np.testing.assert_array_equal(part.values, expected.astype(np.float32))
+    np.testing.assert_array_equal(part.values[:, 0], expected.astype(np.float32))
     assert (
         held.report.samples_filled == len(expected) - 6
         and "filled with the value before them" in held.report.find("gaps filled").text
     )
-    # the last of several rows in an interval counts, and a long gap splits the series if it is asked for
+    # the last of several rows in an interval counts, and a long gap splits the series if it is
+    # asked for
     coarser = cleaned_of(series, interval_s=10.0, fill="hold")
     np.testing.assert_array_equal(
-        coarser.parts[0].values, np.float32([1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5])
+        coarser.parts[0].values[:, 0], np.float32([1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5])
     )
     assert coarser.report.rows_in == coarser.report.rows_used + coarser.report.rows_left_out
     assert (
@@ -489,9 +498,8 @@ def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row():
 
 
 def test_short_parts_are_left_out_and_counted(refused):
-    series = CLEAN.drop(
-        TIMES[[*range(100, 110), *range(115, 130)]]
-    )  # leaves an isolated part of five samples
+    # leaves an isolated part of five samples
+    series = CLEAN.drop(TIMES[[*range(100, 110), *range(115, 130)]])
     assert [len(part) for part in cleaned_of(series).parts] == [100, 5, 270]
     cleaned = cleaned_of(series, min_part=6)
     assert [len(part) for part in cleaned.parts] == [100, 270]
@@ -501,16 +509,18 @@ def test_short_parts_are_left_out_and_counted(refused):
 
 
 def test_jumps_of_the_clock_split_the_series_and_keep_every_row():
-    """The grid of the first part lies between the times before and after the first jump, which are 0.4 s apart."""
+    """The grid of the first part lies between the times before and after the first jump, which are
+    0.4 s apart.
+    """
     times = TIMES + pd.to_timedelta(
         0.4 * (np.arange(N) >= 100) + 0.4 * (np.arange(N) >= 150), unit="s"
     )
     cleaned = cleaned_of(with_times(times))
     before, after = cleaned.parts
-    assert before.values.tolist() == VALUES[:150].astype(
+    assert before.values[:, 0].tolist() == VALUES[:150].astype(
         np.float32
     ).tolist() and after.offset_s == pytest.approx(150 + 0.8 - 0.2)
-    assert after.values.tolist() == VALUES[150:].astype(np.float32).tolist()
+    assert after.values[:, 0].tolist() == VALUES[150:].astype(np.float32).tolist()
     assert (cleaned.report.find("clock steps").count, cleaned.report.rows_used) == (1, N)
 
 
@@ -527,7 +537,9 @@ def test_the_interval_is_that_of_the_rows(interval, unit):
 
 @pytest.mark.parametrize("where", [0, 150, 340])
 def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
-    """Each sample of the stretch is replaced by five rows around its time whose mean equals the sample."""
+    """Each sample of the stretch is replaced by five rows around its time whose mean equals the
+    sample.
+    """
     offsets, differences = (
         np.array([-0.4, -0.2, 0.0, 0.2, 0.4]),
         np.array([1.0, -2.0, 0.5, 2.0, -1.5]),
@@ -549,10 +561,9 @@ def test_a_wandering_clock_splits_the_series_before_a_time_is_off_by_more_than_a
     assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
     begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
     for part in cleaned.parts:
-        rows = part.values.astype(
-            int
-        )  # values are row numbers, so a filled sample lies between two integers
-        real = part.values == rows
+        # values are row numbers, so a filled sample lies between two integers
+        rows = part.values[:, 0].astype(int)
+        real = part.values[:, 0] == rows
         assert np.abs(begin + part.time_s - rows - wander[rows])[real].max() <= 0.25 + 1e-6
 
 
@@ -565,9 +576,8 @@ def test_a_coarser_stretch_is_filled_or_splits_the_series():
         cleaned.report.samples_filled == len(inside)
         and cleaned.report.find("other rates").count == 31
     )
-    wide = cleaned_of(
-        series, max_fill=2
-    )  # three missing samples between rows are more than max_fill
+    # three missing samples between rows are more than max_fill
+    wide = cleaned_of(series, max_fill=2)
     assert [len(part) for part in wide.parts] == [121, 160]
 
 
@@ -576,7 +586,9 @@ def test_a_given_interval_averages_the_rows_that_share_it():
     (part,) = cleaned.parts
     groups = np.round(np.arange(N) / 4).astype(int)  # the nearest grid point, with ties to even
     np.testing.assert_allclose(
-        part.values, [VALUES[groups == group].mean() for group in range(groups[-1] + 1)], atol=1e-6
+        part.values[:, 0],
+        [VALUES[groups == group].mean() for group in range(groups[-1] + 1)],
+        atol=1e-6,
     )
     assert (part.interval_s, cleaned.report.find("averaged").rows_left_out) == (4, N - len(part))
 
@@ -611,9 +623,13 @@ def test_samples_are_counted_without_times():
     for series in (values, values.tolist(), pd.Series(values), pd.Series(values.astype(object))):
         cleaned = cleaned_of(series)
         before, after = cleaned.parts
-        assert (before.has_time, before.interval_s, before.time_unit) == (False, 1.0, "samples")
+        assert (before.clock.has_time, before.interval_s, before.clock.unit) == (
+            False,
+            1.0,
+            "samples",
+        )
         assert (before.offset_s, after.offset_s, len(after)) == (0, 120, N - 120)
-        np.testing.assert_array_equal(after.values, values[120:].astype(np.float32))
+        np.testing.assert_array_equal(after.values[:, 0], values[120:].astype(np.float32))
         gaps = cleaned.report.find("gaps")
         assert gaps.places == ("row 99",) and gaps.details == {"longest": 21.0}
     piece = cleaned_of(pd.Series(VALUES)[50:90])
@@ -638,7 +654,7 @@ def test_properties_of_the_values_are_reported():
     )
     constant = cleaned_of(with_times(TIMES, 3.5))
     assert [finding.kind for finding in repairs(constant.report)] == ["constant"] and set(
-        constant.parts[0].values
+        constant.parts[0].values[:, 0]
     ) == {3.5}
     drifting = cleaned_of(with_times(TIMES, VALUES + np.arange(N) / 100)).report.find(
         "changing level"
@@ -651,9 +667,8 @@ def test_properties_of_the_values_are_reported():
         is not None
     )
     rounded = cleaned_of(with_times(TIMES, VALUES + 1e6)).report.find("resolution")
-    assert rounded.details["error"] == pytest.approx(
-        0.03, abs=0.01
-    )  # float32 keeps steps of 1/16 at a million
+    # float32 keeps steps of 1/16 at a million
+    assert rounded.details["error"] == pytest.approx(0.03, abs=0.01)
 
 
 DIRTY_CELL = st.one_of(
@@ -735,7 +750,9 @@ def test_no_row_is_lost_silently(cells, nominal, options, form):
     max_fill=st.integers(0, 6),
 )
 def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, max_fill):
-    """Rows are dropped, emptied, duplicated, jittered and shuffled; the oracle builds the parts from the remaining times."""
+    """Rows are dropped, emptied, duplicated, jittered and shuffled; the oracle builds the parts
+    from the remaining times.
+    """
     rng = np.random.default_rng(seed)
     values = rng.standard_normal(300)
     off = rng.uniform(-jitter, jitter, 300)
@@ -753,7 +770,7 @@ def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, ma
     assert [len(part) for part in cleaned.parts] == [len(part) for part in expected]
     begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
     for part, wanted, run in zip(cleaned.parts, expected, runs, strict=True):
-        np.testing.assert_allclose(part.values, wanted, atol=1e-5)
+        np.testing.assert_allclose(part.values[:, 0], wanted, atol=1e-5)
         assert begin + part.offset_s == pytest.approx(run[0], abs=max(1e-5, 1.5 * jitter))
 
 
@@ -770,3 +787,29 @@ def test_what_channels_share_is_said_once():
         line for line in rest if line.startswith("volts: ")
     ]
     assert lines_of(reports[:1]) == reports[0].lines() == [f"volts: {reports[0].summary}", *shared]
+
+
+def test_a_logger_clock_with_jitter_is_read_at_its_median_rate():
+    """Steps of 4 ms, of which each is longer or shorter by up to a half, as flight loggers have."""
+    rng, number = np.random.default_rng(5), 4_000
+    seconds = np.cumsum(4e-3 * rng.uniform(0.5, 1.5, number))
+    times = START + pd.to_timedelta(seconds, unit="s")
+    cleaned = clean(pd.Series(np.sin(3 * seconds), times), Cleaning(min_part=32))
+    assert cleaned.report.find("jitter") and len(cleaned.parts) == 1
+    assert cleaned.report.rows_used > 0.6 * number
+    begin_s = (pd.Timestamp(cleaned.telemetry.start) - START).total_seconds()
+    at = begin_s + cleaned.telemetry.time_s
+    np.testing.assert_allclose(cleaned.telemetry.values[:, 0], np.sin(3 * at), atol=0.02)
+
+
+def test_noise_is_measured_on_what_was_measured_and_filled_samples_are_a_warning():
+    rng, number = np.random.default_rng(6), 2_000
+    values = np.sin(np.arange(number) / 300) + 0.1 * rng.standard_normal(number)
+    values[np.arange(number) % 5 > 1] = np.nan  # two of five are there
+    cleaned = clean(values)
+    assert cleaned.report.find("mostly filled").action == "WARNING"
+    assert cleaned.report.lines()[0].startswith("WARNING: 60%")
+    (part,) = cleaned.telemetry.parts
+    assert part.measured.sum() == 800
+    assert estimate_noise_sd([part.measured_values(0)]) == pytest.approx(0.1, rel=0.1)
+    assert estimate_noise_sd([part.values[:, 0]]) < 0.07

@@ -1,4 +1,6 @@
-"""Tables in the forms that people have: each is read with the right times and values, or refused in one line that says what to do."""
+"""Tables in the forms that people have: each is read with the right times and values, or refused in
+one line that says what to do.
+"""
 
 import gzip
 import zipfile
@@ -7,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.inject import inject
 from enhsim_tf.datasets.label_columns import write_table
-from enhsim_tf.datasets.places import InjectOptions
+from enhsim_tf.datasets.options import InjectOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.times import epoch_unit
 from enhsim_tf.telemetry.reading.columns import anomalous
@@ -49,7 +52,7 @@ def check(series, values=VALUES, start=START, interval_s=60.0, options=None):
         assert part.start is None
     else:
         assert abs(pd.Timestamp(part.start) - start) <= pd.Timedelta("2ms")
-    np.testing.assert_allclose(part.values, values, atol=1e-5)
+    np.testing.assert_allclose(part.values[:, 0], values, atol=1e-5)
     return cleaned.report
 
 
@@ -57,6 +60,24 @@ ZERO = pd.Timestamp(0, tz="UTC")
 MINUTES, UTC = stamps("%Y-%m-%d %H:%M"), stamps("%Y-%m-%dT%H:%M:%SZ")
 # form: text, start of the series
 READ = {
+    "hundreds of blank lines": (
+        table("time,v", UTC, VALUES).replace("v\n", "v\n" + "\n" * 400, 1),
+        START,
+    ),
+    "a compact date, hours and minutes": (
+        table("Date,Hour,Minute,v", *(stamps(form) for form in ("%Y%m%d", "%H", "%M")), VALUES),
+        START,
+    ),
+    "a line of formats": (
+        table(
+            "agency_cd\tdatetime\t69928_00060\n5s\t20d\t14n",
+            ["USGS"] * N,
+            UTC,
+            VALUES,
+            separator="\t",
+        ),
+        START,
+    ),
     "ISO 8601 with a comma": (
         table("time;v", stamps("%Y-%m-%d %H:%M:%S,500"), VALUES, separator=";"),
         START + pd.Timedelta("500ms"),
@@ -185,6 +206,27 @@ READ = {
         table('"Time, GMT+02:30",v', stamps("%Y-%m-%d %H:%M"), VALUES),
         START - pd.Timedelta("2.5h"),
     ),
+    "row numbers of a table of which rows were left out": (
+        table("Unnamed: 0,time,v", 3 * np.arange(N) ** 2, UTC, VALUES),
+        START,
+    ),
+    "intervals in one cell": (
+        table(
+            "period;v",
+            [f"{a}/{b}" for a, b in zip(UTC, (*UTC[1:], UTC[0]), strict=True)],
+            VALUES,
+            separator=";",
+        ),
+        START,
+    ),
+    "the time within a step, named by t": (
+        table("Time[s],t-Step[s],v", SECONDS, SECONDS % 600, VALUES),
+        ZERO,
+    ),
+    "units of several columns in columns of one name": (
+        table("time,Units,v,Units", UTC, ["C"] * N, VALUES, ["V"] * N),
+        START,
+    ),
     "row numbers of pandas": (table("Unnamed: 0,time,v", range(N), UTC, VALUES), START),
     "a spreadsheet's first line": (
         table("time;v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=";", above="\ufeffsep=;\n"),
@@ -298,7 +340,7 @@ ASKED = {
     ),
     "days of a spreadsheet": (
         table("Date,v", [f"{45352 + second / 86400:.8f}" for second in SECONDS], VALUES),
-        "excel (from 2024-03-01",
+        "excel from 2024-03-01",
         {"options": Cleaning(time_format="excel")},
         60,
     ),
@@ -347,18 +389,63 @@ ASKED = {
 }
 # form: text, words of the refusal
 REFUSED = {
+    "the text of sar": (
+        table(
+            "12:00:01 AM  %user  %idle",
+            stamps("%I:%M:%S %p"),
+            VALUES,
+            100 - VALUES,
+            separator="  ",
+            above="Linux 5.4.0 (host1)\t03/01/2024\t_x86_64_\n\n",
+        ),
+        "sadf -d",
+    ),
+    "a log of a serial monitor": (
+        table("00:00:00.012 -> 20.1", stamps("%H:%M:%S.012"), VALUES, separator=" -> "),
+        "a comma instead of ' -> '",
+    ),
+    "names beside their values": (
+        "".join(f"Temp: {value} C\n" for value in VALUES),
+        "--no-header",
+        {"options": Cleaning(no_header=True)},
+        1,
+    ),
+    "a name and its value in one cell": (
+        "".join(f"Temp:{value}C\n" for value in VALUES),
+        "only numbers below a line of names",
+    ),
+    "blanks between columns without names, below two other lines": (
+        table("Albuquerque", range(10, 10 + N), VALUES, separator="  ", below="").replace(
+            "\n", "\n 35.04 -106.6 1617 version 1\n", 1
+        ),
+        "--no-header",
+        {"options": Cleaning(no_header=True), "time": "column 0"},
+        1,
+    ),
+    "a clock without a name": (
+        table("", 250 * np.arange(N), VALUES).removeprefix("\n"),
+        "--no-header",
+        {"options": Cleaning(no_header=True, time_format="ms"), "time": "column 0"},
+        0.25,
+    ),
+    "a clock that stays": (
+        table("time,v", np.arange(N) // 5, VALUES),
+        "named like one and does not",
+        {"time": "none"},
+        1,
+    ),
     "years of two digits in front or behind": (
         table("time,v", stamps("%y/%m/%d %H:%M"), VALUES),
-        "'%d/%m/%y %H:%M' or '%y/%m/%d %H:%M'",
+        "--time-format '%y/%m/%d %H:%M'",
     ),
     "decimal years": (table("time,v", 2020 + SECONDS / 86_400, VALUES), "decimal years or seconds"),
     "times of day in numbers": (
         table("time,v", [f"12{minute:02d}00" for minute in range(N)], VALUES),
-        "hhmmss or seconds",
+        "times of day or seconds",
     ),
     "microseconds since boot": (
         table("timestamp,v", 623_456_789 + 19_987 * np.arange(N), VALUES),
-        "time_format 'ms' or 'us'",
+        "--time-format us",
     ),
     "seconds since 1904": (
         table("time,v", TIMES.as_unit("s").asi8 + 2_082_844_800, VALUES),
@@ -388,7 +475,7 @@ REFUSED = {
     ),
     "days or months first": (
         table("time,v", dates("%d/%m/%Y", 31)[:2].repeat(N // 2), VALUES),
-        "'%d/%m/%Y' or '%m/%d/%Y'",
+        "--time-format %m/%d/%Y",
     ),
     "a date and a time in numbers": (
         table("Date,Time,v", stamps("%Y%m%d"), stamps("%H%M%S"), VALUES),
@@ -405,7 +492,7 @@ REFUSED = {
     "no names": (table("0.0,20.0", SECONDS[1:] + 0.5, VALUES[1:]), "--no-header"),
     "digits that a spreadsheet dropped": (
         table("time,v", ["1.70925E+12"] * N, VALUES),
-        "if the clock lost digits",
+        "a clock that lost digits",
     ),
     "minutes where there are seconds": (
         table("time,v", ["2024-03-01 00:00", "2024-03-01 00:01"] * 30, VALUES),
@@ -437,7 +524,7 @@ REFUSED = {
         table("time,v", SECONDS, [f"{value} {'V' if value > 16 else 'mV'}" for value in VALUES]),
         f"mV' at line {2 + np.argmax(VALUES <= 16)}",
     ),
-    "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), "'v' more than once"),
+    "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), "v.1, v.2"),
     "numbered sensors": (
         table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)),
         "--series-column sensor_id",
@@ -456,7 +543,19 @@ def test_a_form_with_two_meanings_is_refused_and_read_as_the_message_says(tmp_pa
         arguments, interval_s = how
         cleaned = clean(only(read_source(tmp_path / "a.csv", **arguments)))
         assert cleaned.longest.interval_s == pytest.approx(interval_s)
-        np.testing.assert_allclose(cleaned.longest.values, VALUES, atol=1e-5)
+        np.testing.assert_allclose(cleaned.longest.values[:, 0], VALUES, atol=1e-5)
+
+
+def test_a_column_without_a_name_that_does_not_count_by_one_may_be_the_clock(tmp_path, refused):
+    (tmp_path / "a.csv").write_text(table("", 250 * np.arange(N), VALUES).removeprefix("\n"))
+    with refused("--time 'column 0' --time-format ms"):
+        read_source(tmp_path / "a.csv", options=Cleaning(no_header=True))
+
+
+def test_samples_that_are_counted_are_not_said_to_need_an_interval():
+    with pytest.raises(InputError, match="at least 2 in a row") as refused:
+        clean(pd.Series([1.0, *[np.nan] * 9, 2.0, *[np.nan] * 9]))
+    assert refused.value.options == ({"max_fill": 50},)
 
 
 def test_a_number_and_its_quality_in_one_cell_are_no_decimal(tmp_path):
@@ -590,7 +689,7 @@ def test_a_blank_line_at_the_end_of_several_series_is_none_of_them(tmp_path):
     )
     channels = read_source(tmp_path / "export.csv")
     assert list(channels) == ["amps", "volts"]
-    assert [series.to_list() for series in channels.values()] == [
+    assert [series.cells.to_list() for series in channels.values()] == [
         VALUES.tolist(),
         (VALUES + 1).tolist(),
     ]
@@ -620,9 +719,8 @@ def test_tables_of_annotated_csv_are_series(tmp_path):
     assert list(channels) == ["volts", "amps"]
     check(channels["volts"])
     check(channels["amps"], 2 * VALUES)
-    assert (
-        channels["amps"].attrs["places"].of(0) == "line 70 of a.csv"
-    )  # 3 annotations, names, 60 rows, a blank line, and 4 more
+    # 3 annotations, names, 60 rows, a blank line, and 4 more
+    assert channels["amps"].places.of(0) == "line 70 of a.csv"
     (tmp_path / "b.csv").write_text(
         annotated("volts", VALUES, "mean") + annotated("volts", 2 * VALUES, "max")
     )
@@ -704,9 +802,9 @@ def test_quality_flags_and_counts_beside_a_clock_are_named_and_left_out():
 def test_fill_values_are_reported_and_left_out_when_named(fill):
     series = pd.Series(np.where(np.arange(N) % 20 == 5, fill, VALUES), index=TIMES)
     found = clean(series).report.find("fill values")
-    assert found.details["values"] == [fill] and f"--missing-values={fill:g}" in found.text
+    assert found.details["values"] == [fill] and "--missing-values" in found.text
     cleaned = clean(series, Cleaning(missing_values=[fill]))
-    assert cleaned.report.rows_left_out == 3 and cleaned.parts[0].values.max() < 26
+    assert cleaned.report.rows_left_out == 3 and cleaned.parts[0].values[:, 0].max() < 26
 
 
 @pytest.mark.parametrize(("others", "is_found"), [(10, True), (9, False)])
@@ -774,7 +872,7 @@ def test_files_of_several_days_are_one_table(tmp_path, refused):
     report = check(only(read_source(folder)))
     assert "day1.csv to day10.csv" in report.find("files").text
     series = only(read_source([folder / "day1.csv", folder / "day2.csv", folder / "day10.csv"]))
-    assert series.attrs["places"].of(30) == "line 2 of day2.csv"
+    assert series.places.of(30) == "line 2 of day2.csv"
     (folder / "day2.csv").write_text("time,w\n2024-03-02,1\n")
     with refused("'v' not exactly once in day1.csv and day2.csv"):
         read_source(folder)
@@ -805,7 +903,7 @@ def test_a_workbook_is_read_with_its_dates(tmp_path):
     book.save(tmp_path / "a.xlsx")
     series = only(read_source(tmp_path / "a.xlsx"))
     check(series)
-    assert (series.name, series.attrs["places"].of(0)) == ("Spannung", "line 4")
+    assert (series.name, series.places.of(0)) == ("Spannung", "line 4")
 
 
 def test_a_workbook_whose_first_sheet_has_no_numbers_says_which_sheet_was_read(tmp_path, refused):
@@ -832,7 +930,7 @@ def test_pandas_objects_are_sources():
 @pytest.mark.parametrize("form", ["labelled.csv", "labelled.parquet", "timeeval.csv"])
 def test_the_files_of_this_tool_are_read_back(tmp_path, form):
     cleaned = clean(pd.Series(VALUES, index=TIMES, name="value"))
-    frame = inject(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0))
+    frame = inject(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0)).table
     write_table(tmp_path / form, frame, ["value"] if form == "timeeval.csv" else ())
     series = only(read_source(tmp_path / form))
     report = check(series, frame["value"])
@@ -876,7 +974,7 @@ def test_whole_and_fractional_seconds_are_read_in_one_column(tmp_path):
         for row, time in enumerate(TIMES)
     ]
     (tmp_path / "a.csv").write_text(table("time;v", times, VALUES, separator=";"))
-    index = only(read_source(tmp_path / "a.csv")).index
+    index = only(read_source(tmp_path / "a.csv")).times.stamps
     assert (index[0] - START.tz_localize(None), index[1] - index[0]) == (
         pd.Timedelta("250ms"),
         pd.Timedelta("59.75s"),
@@ -887,7 +985,7 @@ def test_a_year_and_a_month_are_the_first_day_of_the_month():
     frame = pd.DataFrame(
         {"year": 1990 + np.arange(N) // 12, "month": 1 + np.arange(N) % 12, "v": VALUES}
     )
-    assert only(read_source(frame)).index[-1] == pd.Timestamp("1994-12-01")
+    assert only(read_source(frame)).times.stamps[-1] == pd.Timestamp("1994-12-01")
 
 
 def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused):

@@ -1,4 +1,6 @@
-"""Tests of the InfluxDB store with a real server: points are restored bit for bit despite server restarts; errors are one line."""
+"""Tests of the InfluxDB store with a real server: points are restored bit for bit despite server
+restarts; errors are one line.
+"""
 
 import io
 import logging
@@ -138,7 +140,8 @@ def test_a_series_of_another_program_is_read_unchanged(bucket):
         "float64 as it is kept"
     )
     ((name, channel),) = read_source(_location(bucket, "bus/volts?craft=A")).items()
-    assert name == "volts" and (channel.index.asi8 == times).all() and (channel == values).all()
+    assert name == "volts" and (channel.series.index.asi8 == times).all()
+    assert (channel.series == values).all()
     found, read = InfluxStore(_location(bucket, "bus/amperes")).read()
     assert np.array_equal(found, times) and np.array_equal(read, np.arange(len(times))), (
         "whole numbers are numbers"
@@ -175,9 +178,8 @@ def test_anything_but_one_numeric_series_is_refused(bucket, refused):
 
 def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, bucket, caplog):
     million = 10**6
-    values = (
-        np.random.default_rng(0).permutation(million).astype(np.float32)
-    )  # integers, whose sum is exact in any order
+    # integers, whose sum is exact in any order
+    values = np.random.default_rng(0).permutation(million).astype(np.float32)
     writing = threading.Thread(
         target=InfluxStore(_location(bucket)).write, args=(10**9 * np.arange(million), values)
     )
@@ -216,7 +218,7 @@ def test_an_unknown_token_organisation_or_bucket_is_named(named, bucket, monkeyp
 
 def test_missing_samples_are_noticed(bucket, refused):
     store = InfluxTelemetry(_location(bucket))
-    store.write(Telemetry(_points(1_000)[1], 1.0, start="2020-01-01T00:00:00Z"))
+    store.write(Telemetry(_points(1_000)[1].astype(np.float32), 1.0, "2020-01-01T00:00:00Z"))
     with _client() as client:
         client.delete_api().delete(
             "2020-01-01T00:08:00Z", "2020-01-01T00:08:00Z", '_measurement="wheel"', bucket

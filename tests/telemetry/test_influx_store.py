@@ -1,4 +1,6 @@
-"""Tests of the InfluxDB store without a server: locations, answers, and refusals in one line before any work."""
+"""Tests of the InfluxDB store without a server: locations, answers, and refusals in one line before
+any work.
+"""
 
 import subprocess
 import sys
@@ -133,6 +135,41 @@ def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refu
             with refused(words):
                 InfluxStore("influxdb://b/m/f").check()
         other.shutdown()
+
+
+def test_a_write_has_one_client_which_is_closed(pretended, monkeypatch):
+    import http.server
+
+    from influxdb_client import InfluxDBClient
+
+    paths, clients, closed = [], [], []
+
+    class Empty(http.server.BaseHTTPRequestHandler):
+        def log_message(self, *words):
+            pass
+
+        def do_POST(self):  # noqa: N802
+            self.rfile.read(int(self.headers["Content-Length"]))
+            paths.append(self.path.partition("?")[0])
+            self.send_response(200 if "query" in self.path else 204)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+
+    opened = InfluxDBClient.__init__
+    close = InfluxDBClient.close
+    monkeypatch.setattr(
+        InfluxDBClient,
+        "__init__",
+        lambda self, *given, **more: clients.append(self) or opened(self, *given, **more),
+    )
+    monkeypatch.setattr(InfluxDBClient, "close", lambda self: closed.append(self) or close(self))
+    with http.server.HTTPServer(("127.0.0.1", 0), Empty) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{server.server_port}")
+        InfluxStore("influxdb://b/m/f").write(np.arange(6_000), np.ones(6_000, np.float32))
+        server.shutdown()
+    assert paths == ["/api/v2/query", "/api/v2/write", "/api/v2/write"]
+    assert len(clients) == 1 and closed == clients
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,6 @@
-"""Levels of quantised telemetry are found, other telemetry has none, and values are rounded to the nearest level."""
+"""Levels of quantised telemetry are found, other telemetry has none, and values are rounded to the
+nearest level.
+"""
 
 import numpy as np
 import pytest
@@ -10,9 +12,8 @@ from enhsim_tf.telemetry.quantisation import Levels
 def test_the_levels_of_quantised_values_are_found(step):
     rng = np.random.default_rng(0)
     values = (step * np.round(rng.normal(20, 3, 5_000))).astype(np.float32)
-    values[100:103] += np.float32(step) * np.array(
-        [0.25, 0.5, 0.75], np.float32
-    )  # an interpolated gap
+    # an interpolated gap
+    values[100:103] += np.float32(step) * np.array([0.25, 0.5, 0.75], np.float32)
     found = Levels.find(values)
     assert found.step == pytest.approx(step, rel=1e-6) and 15 <= found.count <= 25
     kept = np.delete(values, np.arange(100, 103))
@@ -36,15 +37,13 @@ def test_values_off_the_grid_by_a_rounding_error_are_the_same_level():
     "values",
     [
         np.random.default_rng(0).standard_normal(5_000),
-        np.tile(
-            np.sin(2 * np.pi * np.arange(50) / 50), 100
-        ),  # values of a noise-free wave repeat too
+        # values of a noise-free wave repeat too
+        np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),
         np.clip(np.random.default_rng(0).standard_normal(5_000), -1, 1),  # a saturated sensor
         np.arange(20.0),
         np.random.default_rng(0).choice([0.0, 1.0, 1.7], 500),
-        np.random.default_rng(0).uniform(
-            0, 1, 2_000_000
-        ),  # so dense that most neighbours differ by less than a millionth
+        # so dense that most neighbours differ by less than a millionth
+        np.random.default_rng(0).uniform(0, 1, 2_000_000),
     ],
     ids=["noise", "wave", "clipped", "short", "uneven", "dense"],
 )

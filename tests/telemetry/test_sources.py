@@ -4,10 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry import sources
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.pandas_series import to_series
+from enhsim_tf.telemetry.reading import channels
+from enhsim_tf.telemetry.reading.formats import READERS
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.sources import read_source
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
 
 N = 50
 TIMES = pd.date_range("2020-03-01T06:00:00Z", periods=N, freq="250ms")
@@ -19,11 +23,12 @@ CSV = TABLE[["utc", "volts"]].to_csv(index=False, date_format="%Y-%m-%dT%H:%M:%S
 
 
 def check(channel, name="volts", values=VALUES):
-    assert isinstance(channel.index, pd.DatetimeIndex) and (channel.name, len(channel)) == (name, N)
+    series = channel.series
+    assert isinstance(series.index, pd.DatetimeIndex) and (series.name, len(series)) == (name, N)
     cleaned = clean(channel)
     (part,) = cleaned.parts
     assert (part.interval_s, part.start) == (0.25, "2020-03-01T06:00:00+00:00")
-    np.testing.assert_allclose(part.values, values, atol=1e-6)
+    np.testing.assert_allclose(part.values[:, 0], values, atol=1e-6)
     return cleaned
 
 
@@ -54,7 +59,7 @@ def test_columns_by_name_and_all_of_numbers(tmp_path):
             finding.kind for finding in clean(named["amps"]).report.findings
         ] == ["clock"]
         counted = read_source(tmp_path / file, columns="amps", time="none")["amps"]
-        assert isinstance(counted.index, pd.RangeIndex) and clean(counted).parts[0].start is None
+        assert counted.times is None and clean(counted).parts[0].start is None
 
 
 def test_channels_without_time(tmp_path):
@@ -64,48 +69,46 @@ def test_channels_without_time(tmp_path):
     np.save(tmp_path / "column.npy", VALUES[:, None])
     assert list(read_source(tmp_path / "wheel.npy")) == ["wheel.0", "wheel.1"]
     (channel,) = read_source(tmp_path / "wheel.npy", columns=[1]).values()
-    assert (channel.name, channel.tolist()) == ("wheel.1", (3 * VALUES).tolist()) and isinstance(
-        channel.index, pd.RangeIndex
-    )
+    assert (channel.name, channel.cells.tolist()) == ("wheel.1", (3 * VALUES).tolist())
+    assert channel.times is None
     for name in ("one", "column"):
-        assert read_source(tmp_path / f"{name}.npy")[name].tolist() == VALUES.tolist()
+        assert read_source(tmp_path / f"{name}.npy")[name].cells.tolist() == VALUES.tolist()
     (tmp_path / "a.csv").write_text("a,b\n1,2\n2,5\n\n4,\n")
     channels = read_source(tmp_path / "a.csv")
-    assert channels["a"].isna().tolist() == [False, False, True, False], "a blank line is a row"
+    assert channels["a"].cells.isna().tolist() == [False, False, True, False], (
+        "a blank line is a row"
+    )
     assert clean(channels["b"]).report.find("missing values").count == 2
 
 
-def test_commands_are_beside_the_channel_that_they_may_explain(tmp_path):
-    sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(
-        float
-    )  # one command after the other
+def test_commands_are_no_channels_unless_they_are_named(tmp_path):
+    # one command after the other
+    sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(float)
     np.save(tmp_path / "a.npy", np.column_stack([VALUES, sent]))
-    for columns in (None, ["0"]):
-        found = read_source(tmp_path / "a.npy", columns)
-        assert list(found) == ["a.0"] and found.commands.tolist() == sent.tolist()
-    assert read_source(tmp_path / "a.npy", ["3"]).commands is None, (
-        "it would be explained by itself"
-    )
+    assert list(read_source(tmp_path / "a.npy")) == ["a.0"]
+    assert list(read_source(tmp_path / "a.npy", ["0", "3"])) == ["a.0", "a.3"]
     np.save(tmp_path / "b.npy", np.column_stack([VALUES, 2 * sent]))
-    assert len(found := read_source(tmp_path / "b.npy")) == 25 and found.commands is None
+    assert len(read_source(tmp_path / "b.npy")) == 25
 
 
 def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
-    """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a killed recorder."""
+    """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a
+    killed recorder.
+    """
     rows = ["{}:00,1", ",2", "{}:01,3", "boot,4", "{}:01,3", "{}:02,5", "{}:03"]
     (tmp_path / "a.csv").write_text(
         "\n".join(["time,volts", *rows]).replace("{}", "2020-03-01T00:00")
     )
     channel = read_source(tmp_path / "a.csv", options=Cleaning(drop_bad=True))["volts"]
     report = clean(channel).report
-    assert (report.rows_in, report.rows_used, report.rows_left_out, report.samples) == (7, 3, 4, 3)
+    assert (report.rows_in, report.rows_used, report.rows_left_out, report.samples) == (6, 3, 3, 3)
     found = {finding.kind: finding.count for finding in report.findings}
     assert found == {
         "clock": 1,
         "bad times": 1,
-        "missing times": 2,
+        "missing times": 1,
         "duplicate rows": 1,
-        "missing values": 1,
+        "ragged lines": 1,
     }
 
 
@@ -123,14 +126,14 @@ BAD = {
         "a.csv",
         b"a,a,b\n1,2,3\n3,4,5\n",
         {"columns": ["a"]},
-        "'a' more than once",
+        "a.1, a.2, b",
     ),
     "no such column": ("a.csv", b"a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
     "two time columns": (
         "a.csv",
-        b"start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n",
+        b"start,planned,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n",
         {},
-        "start, end",
+        "start, planned",
     ),
     "words only": ("a.csv", b"a,b\nx,y\nz,w\n", {}, "none in a.csv"),
     "no columns named": ("a.csv", b"a,b\n1,2\n", {"columns": []}, "columns=[]"),
@@ -188,19 +191,63 @@ def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
     ).parts
     assert (
         np.abs(part.time_s - times).max() < 0.05 * interval_s
-        and part.values.tolist() == (np.arange(400) % 7).tolist()
+        and part.values[:, 0].tolist() == (np.arange(400) % 7).tolist()
     )
-    assert (part.start[:19], part.time_unit) == ("1970-01-01T00:00:00", "s")
+    assert (part.start[:19], part.clock.unit) == ("1970-01-01T00:00:00", "s")
 
 
 def test_telemetry_to_pandas_and_back(refused):
-    timed = Telemetry(VALUES.astype(np.float32), 0.25, 2.5, "2020-03-01T06:00:00+00:00", "volts")
+    timed = Telemetry.of(VALUES.astype(np.float32), 0.25, 2.5, "2020-03-01T06:00:00+00:00", "volts")
     series = to_series(timed)
     assert (series.index == TIMES + pd.Timedelta("2.5s")).all() and series.name == "volts"
     (back,) = clean(series).parts
     assert (back.values == timed.values).all() and (back.interval_s, back.name) == (0.25, "volts")
     assert pd.Timestamp(back.start) + pd.Timedelta(seconds=back.offset_s) == series.index[0]
-    counted = to_series(Telemetry(VALUES.astype(np.float32), offset_s=7.0))
+    counted = to_series(Telemetry.of(VALUES.astype(np.float32), offset_s=7.0))
     assert (counted.index[0], clean(counted).longest.offset_s) == (7, 7.0)
     with refused("ndarray"):
         to_series(VALUES)
+
+
+@pytest.mark.parametrize("ending", READERS)
+def test_every_reader_refuses_what_is_damaged(ending, tmp_path):
+    check_reader(ending, tmp_path)
+
+
+def check_reader(ending, folder):
+    """Files that are empty, cut off or something else are refused in one line."""
+    path = folder / f"damaged{ending}"
+    for content in (b"", b"\x93NUMPY", b"{", b"\xff\xfe\x00words", b"[" * 100_000):
+        path.write_bytes(content)
+        with pytest.raises(InputError) as caught:
+            read_telemetry(path)
+        assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("begin_s", [-10.0, 4e7])
+def test_a_clock_that_counts_is_never_one_of_dates(begin_s):
+    frame = pd.DataFrame({"time_s": begin_s + np.arange(400.0), "volts": np.arange(400) % 7})
+    (telemetry,) = read_telemetry(frame)
+    assert telemetry.clock.counts and telemetry.clock.kind == "counted"
+    assert telemetry.nanoseconds.tolist() == [int((begin_s + k) * 1e9) for k in range(400)]
+
+
+@pytest.mark.parametrize("source", [[[1.0, 2.0], [3.0, 4.0]], [1.0, 2.0], 3, None, np.ones(9)])
+def test_what_is_no_source_is_refused(source, refused):
+    with refused("Received: "):
+        read_source(source)
+
+
+def test_a_defect_of_ours_is_not_said_to_be_one_of_the_file(tmp_path, monkeypatch):
+    np.save(tmp_path / "a.npy", VALUES)
+    pd.DataFrame({"volts": VALUES}).to_csv(tmp_path / "a.csv", index=False)
+
+    def defect(*given, **options):
+        raise AttributeError("a defect")
+
+    monkeypatch.setattr(channels, "lay_out", defect)
+    monkeypatch.setattr(sources, "refuse_channels_first", defect)
+    monkeypatch.setattr(sources, "RawChannel", defect)
+    for name in ("a.npy", "a.csv"):
+        with pytest.raises(AttributeError, match="a defect"):
+            read_source(tmp_path / name)

@@ -16,7 +16,7 @@ DAY = 45_000.0  # of a spreadsheet: 2023-03-15
 
 @pytest.mark.parametrize("step", [1 / 24, 1 / 1_440, 0.1 / 86_400])
 def test_steps_of_whole_hours_minutes_or_tenth_seconds_look_like_days(refused, step):
-    with refused("may be days", "excel (from 2023-03-15"):
+    with refused("may be days", "excel from 2023-03-15"):
         refuse_two_meanings(DAY + step * np.arange(5), "clock")
 
 
@@ -63,9 +63,8 @@ class Log:
 
 @pytest.mark.parametrize("minutes", [[0, 20, 40, 60, 20, 40, 60], [0, 20, 20, 40, 60, 20, 40, 60]])
 def test_times_that_step_back_by_an_hour_are_refused(refused, minutes):
-    minutes = np.array(minutes) - np.where(
-        np.arange(len(minutes)) > len(minutes) - 4, 20, 0
-    )  # the clock goes from 60 to 0
+    # the clock goes from 60 to 0
+    minutes = np.array(minutes) - np.where(np.arange(len(minutes)) > len(minutes) - 4, 20, 0)
     with refused(f"row {len(minutes) - 3} of volts", "--timezone"):
         refuse_steps_back(
             60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts", has_zone=False

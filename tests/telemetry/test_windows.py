@@ -15,9 +15,8 @@ def test_blocks_of_time_by_hand():
 
 
 def test_windows_that_overlap_the_held_out_block_are_left_out():
-    starts = np.arange(
-        0, 60, 5
-    )  # windows of 10: neighbours share 5 samples; blocks begin at 0, 20 and 40
+    # windows of 10: neighbours share 5 samples; blocks begin at 0, 20 and 40
+    starts = np.arange(0, 60, 5)
     training, held_out = time_blocks(starts, 3, 10)[1]
     assert starts[held_out].tolist() == [20, 25, 30, 35] and starts[training].tolist() == [
         0,
@@ -57,8 +56,6 @@ def test_random_starts_reach_every_window_and_no_more(refused):
 def test_evenly_spaced_starts_reach_from_end_to_end():
     assert evenly_spaced_starts([range(110)], 10, 5).tolist() == [0, 25, 50, 75, 100]
     starts = evenly_spaced_starts([range(1_000)], 60, 37)
-    assert (starts[0], starts[-1]) == (0, 940) and set(np.diff(starts)) == {
-        26,
-        27,
-    }  # 940 / 36 = 26.1
+    # 940 / 36 = 26.1
+    assert (starts[0], starts[-1]) == (0, 940) and set(np.diff(starts)) == {26, 27}
     assert evenly_spaced_starts([range(60)], 60, 3).tolist() == [0]

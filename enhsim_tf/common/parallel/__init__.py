@@ -1,1 +1,3 @@
-"""Parallel work: calls a function for many items, in processes of this machine or of a Ray cluster."""
+"""Parallel work: calls a function for many items, in processes of this machine or of a Ray
+cluster.
+"""

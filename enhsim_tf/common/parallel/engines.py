@@ -1,7 +1,8 @@
 """Engines that call a function for many items in several processes.
 
-Each process uses one thread, so that results do not depend on the number of cores. A process that dies is replaced and its item is
-computed again. An engine gives up after more than five consecutive worker failures.
+Each process uses one thread, so that results do not depend on the number of cores. A process that
+dies is replaced and its item is computed again. An engine gives up after more than five consecutive
+worker failures.
 """
 
 import pickle
@@ -12,10 +13,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.local import run_local
 from enhsim_tf.common.parallel.ray import run_ray
 
-ENGINES = {
-    "local": (run_local, 512),
-    "ray": (run_ray, 10_000),
-}  # with the maximum number of workers
+# with the maximum number of workers
+ENGINES = {"local": (run_local, 512), "ray": (run_ray, 10_000)}
 
 
 def run(
@@ -26,18 +25,21 @@ def run(
     Args:
         engine: `local` or `ray`.
         work: Function of one item. It is pickled for each process.
-        items: Arguments of `work`, none of which may be None. They are drawn and pickled only when a worker can take them, so
-            that memory does not grow with their number.
+        items: Arguments of `work`, none of which may be None. They are drawn and pickled only when
+            a worker can take them, so that memory does not grow with their number.
         workers: Number of processes. None: one per CPU.
 
     Raises:
-        InputError: If `work` raises one, if the engine cannot be used, or if its processes keep dying (`ProcessesDiedError`).
+        InputError: If `work` raises one, if the engine cannot be used, or if its processes keep
+            dying (`ProcessesDiedError`).
     """
     return ENGINES[engine][0](pickle.dumps(work), iter(items), workers)
 
 
 def parse_workers(text: str | None, engine: str | None = None) -> int | None:
-    """Parses the option `--workers auto|N`, for the engine `local` if none is given: a number, or None for one per CPU."""
+    """Parses the option `--workers auto|N`, for the engine `local` if none is given: a number, or
+    None for one per CPU.
+    """
     if text in (None, "auto"):
         return None
     _, most = ENGINES[engine or "local"]

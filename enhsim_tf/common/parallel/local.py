@@ -30,7 +30,8 @@ class ProcessesDiedError(InputError):
 
     def __init__(self, items: Iterable[Any], reason: str = ""):
         super().__init__(
-            f"Expected worker processes that stay alive. Received: {MAX_FAILURES + 1} that died in a row{reason and f' ({reason})'}. "
+            f"Expected worker processes that stay alive. Received: {MAX_FAILURES + 1} that died in "
+            f"a row{reason and f' ({reason})'}. "
             "Memory may be too small: use fewer --workers. Finished work is kept."
         )
         self.items = tuple(items)
@@ -38,11 +39,12 @@ class ProcessesDiedError(InputError):
 
 def run_local(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
     """Implements `engines.run` with processes of this machine; `work` is pickled."""
-    num_processes, retry, failures = workers or num_cpus(), collections.deque(), 0
+    num_processes = workers or num_cpus()
+    retry = collections.deque()
+    failures = 0
     while failures <= MAX_FAILURES:
-        with _pool(
-            num_processes
-        ) as pool:  # it starts a process when an item is submitted and none is idle
+        # it starts a process when an item is submitted and none is idle
+        with _pool(num_processes) as pool:
             running: dict[concurrent.futures.Future, Any] = {}
             try:
                 while True:
@@ -61,13 +63,11 @@ def run_local(work: bytes, items: Iterator[Any], workers: int | None) -> Iterato
                         failures = 0
                         yield result
             except BrokenProcessPool:
-                retry.extendleft(
-                    reversed(running.values())
-                )  # before what was not submitted yet, as the pool had taken it
+                # before what was not submitted yet, as the pool had taken it
+                retry.extendleft(reversed(running.values()))
         failures += 1
-    raise ProcessesDiedError(
-        itertools.islice(retry, num_processes)
-    )  # the others were still waiting
+    # the others were still waiting
+    raise ProcessesDiedError(itertools.islice(retry, num_processes))
 
 
 def num_cpus() -> int:
@@ -78,7 +78,9 @@ def num_cpus() -> int:
 def _submit(
     pool: concurrent.futures.ProcessPoolExecutor, work: bytes, item: Any, retry: collections.deque
 ) -> concurrent.futures.Future:
-    """Submits an item to the pool. A process started by this call ignores SIGINT, which the parent process handles."""
+    """Submits an item to the pool. A process started by this call ignores SIGINT, which the parent
+    process handles.
+    """
     masked = hasattr(signal, "pthread_sigmask")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masked else None
     try:
@@ -93,7 +95,9 @@ def _submit(
 
 @contextlib.contextmanager
 def _pool(workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
-    """A pool of spawned processes that is terminated at once if the block raises. Forking is not used, since TensorFlow hangs."""
+    """A pool of spawned processes that is terminated at once if the block raises. Forking is not
+    used, since TensorFlow hangs.
+    """
     others = set(multiprocessing.active_children())
     pool = concurrent.futures.ProcessPoolExecutor(
         workers, multiprocessing.get_context("spawn"), _watch_parent
@@ -112,7 +116,8 @@ def _pool(workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
 def _start_worker(work: bytes) -> Callable[[Any], Any]:
     """Prepares a process of any engine, and returns the unpickled function.
 
-    The thread counts are set before `work` is unpickled, because unpickling imports the libraries that read them.
+    The thread counts are set before `work` is unpickled, because unpickling imports the libraries
+    that read them.
     """
     numbers = (
         "TF_NUM_INTRAOP_THREADS",
@@ -139,6 +144,8 @@ def _watch_parent() -> None:
 
 
 def _end_with_parent() -> None:
-    """Ends this process when its parent has ended. A killed parent cannot shut the pool down, so its workers would wait forever."""
+    """Ends this process when its parent has ended. A killed parent cannot shut the pool down, so
+    its workers would wait forever.
+    """
     multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
     os._exit(1)

@@ -1,6 +1,7 @@
 """The engine `ray`: each item is a Ray task, on this machine or on the cluster at `RAY_ADDRESS`.
 
-Ray computes a task again whose process or node is lost, and gives a task up that loses `MAX_FAILURES` times more.
+Ray computes a task again whose process or node is lost, and gives a task up that loses
+`MAX_FAILURES` times more.
 """
 
 import contextlib
@@ -18,19 +19,29 @@ _ANSWER_S = 10
 
 
 def run_ray(work: bytes, items: Iterator[Any], workers: int | None) -> Iterator[Any]:
-    """Implements `engines.run` with Ray tasks, of which `workers` run at a time, or one per CPU of the cluster; `work` is pickled."""
+    """Implements `engines.run` with Ray tasks, of which `workers` run at a time, or one per CPU of
+    the cluster; `work` is pickled.
+    """
     first = next(items, None)
     if first is None:
         return
     with _cluster() as ray:
         cpus = max(1, int(ray.cluster_resources().get("CPU", 1)))
-        number, running, item = workers or cpus, {}, first
+        number = workers or cpus
+        running = {}
+        item = first
         task = ray.remote(call).options(
             num_cpus=min(1, cpus / number), max_retries=MAX_FAILURES, scheduling_strategy="SPREAD"
         )
         lost = tuple(
             getattr(ray.exceptions, f"{name}Error")
-            for name in ("WorkerCrashed", "ObjectLost", "NodeDied", "OutOfMemory")
+            for name in (
+                "WorkerCrashed",
+                "ObjectLost",
+                "NodeDied",
+                "OutOfMemory",
+                "LocalRayletDied",
+            )
         )
         try:
             while True:
@@ -65,27 +76,27 @@ def _cluster() -> Iterator[Any]:
         import ray
     except ModuleNotFoundError:
         raise InputError(
-            "Expected the package ray for --engine ray. Received: none. Install it, in a clone: python -m pip install '.[ray]'."
+            "Expected the package ray for --engine ray. Received: none. Install it, in a clone: "
+            "python -m pip install '.[ray]'."
         ) from None
     if ray.is_initialized():
         yield ray
         return
     logging.getLogger("ray").setLevel(logging.ERROR)
     address = os.environ.get("RAY_ADDRESS")
-    local = (
-        {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}
-    )  # only small objects are exchanged
+    # only small objects are exchanged
+    local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}
     _check_address(address)
     try:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter(
-                    "ignore", UserWarning
-                )  # Ray warns of a server that does not answer before it raises
+                # Ray warns of a server that does not answer before it raises
+                warnings.simplefilter("ignore", UserWarning)
                 ray.init(
                     address or "local", logging_level=logging.ERROR, log_to_driver=False, **local
                 )
-        except Exception as error:  # noqa: BLE001  Ray raises plain exceptions, as for a node that does not start in time
+        # Ray raises plain exceptions, as for a node that does not start in time
+        except Exception as error:  # noqa: BLE001
             where = f"at {address}" if address else "that starts here"
             raise InputError(
                 f"Expected a Ray cluster {where}. Received: {_last_line(error)}."
@@ -96,11 +107,12 @@ def _cluster() -> Iterator[Any]:
 
 
 def _check_address(address: str | None) -> None:
-    """Raises an `InputError` at once if nothing answers at the address. Ray itself would retry for minutes."""
+    """Raises an `InputError` at once if nothing answers at the address. Ray itself would retry for
+    minutes.
+    """
     host, _, port = (address or "").rpartition(":")
-    if (
-        not host or not port.isdecimal() or "/" in host
-    ):  # no address, or a form that only Ray can parse
+    # no address, or a form that only Ray can parse
+    if not host or not port.isdecimal() or "/" in host:
         return
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_ANSWER_S).close()

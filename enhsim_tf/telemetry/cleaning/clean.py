@@ -1,11 +1,12 @@
 """Turns raw telemetry into regularly sampled telemetry, and reports every change.
 
-Rows are sorted by time, duplicates are dropped, jittered times are snapped to a regular grid, short gaps are filled, and the
-series is split at long gaps. Input that cannot be interpreted raises an `InputError`. Every row that is left out is reported.
+Rows are sorted by time, duplicates are dropped, jittered times are snapped to a regular grid, short
+gaps are filled, and the series is split at long gaps. Input that cannot be interpreted raises an
+`InputError`. Every row that is left out is reported.
 """
 
 import dataclasses
-from typing import Any
+import functools
 
 import numpy as np
 import pandas as pd
@@ -15,10 +16,11 @@ from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.options import UNITS_NS
 from enhsim_tf.telemetry.cleaning.options import Cleaning as Cleaning
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
+from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.regular_grid import regularise
-from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, iso_time
-from enhsim_tf.telemetry.cleaning.times import localize_times, parse_times, refuse_steps_back
-from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.cleaning.report import CleaningLog, Finding, Report
+from enhsim_tf.telemetry.cleaning.times import Times, localize_times, refuse_steps_back
+from enhsim_tf.telemetry.series import COUNTED, DATES, SAMPLES, Clock, Part, Telemetry, iso_time
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,12 +28,17 @@ class Cleaned:
     """The result of `clean`.
 
     Args:
-        parts: Regularly sampled parts in chronological order. All share one interval and one start; each has its own offset.
+        telemetry: The channel, in regularly sampled parts.
         report: The log of everything that was accepted, repaired or left out.
     """
 
-    parts: list[Telemetry]
+    telemetry: Telemetry
     report: Report
+
+    @property
+    def parts(self) -> list[Telemetry]:
+        """The parts as telemetry of their own, in chronological order."""
+        return self.telemetry.pieces()
 
     @property
     def longest(self) -> Telemetry:
@@ -39,14 +46,19 @@ class Cleaned:
         return max(self.parts, key=len)
 
 
-def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cleaned:
+def clean(
+    channel: RawChannel | pd.Series | np.ndarray,
+    options: Cleaning | None = None,
+    describe: bool = True,
+) -> Cleaned:
     """Turns one raw channel into regularly sampled telemetry.
 
     Args:
-        series: The channel. Its values can be anything that can be parsed as numbers. Its index holds the times: date-times,
-            ISO 8601 text, or numbers since 1970. An array, or a series with a `RangeIndex`, has no times, and its samples are
-            counted instead.
+        channel: The channel. Its values can be anything that can be parsed as numbers. The index of
+            a Series holds the times: date-times, ISO 8601 text, or numbers since 1970. An array, or
+            a series with a `RangeIndex`, has no times, and its samples are counted instead.
         options: How problems are treated. None: the defaults of `Cleaning`.
+        describe: Whether the report says what is striking about the values, such as fill values.
 
     Returns:
         The regular parts and the cleaning report.
@@ -55,121 +67,130 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         InputError: If the input is not a series of numbers, or has no regularly sampled part.
     """
     options = options or Cleaning()
-    is_series = isinstance(series, pd.Series)
-    name = "telemetry" if not is_series or series.name is None else str(series.name)
-    about = series.attrs if is_series else {}
-    places, decimal = about.get("places", ROWS), options.decimal or about.get("decimal")
+    raw = RawChannel.of(channel, options)
     values, bad, noted = parse_numbers(
-        series, name, options.drop_bad, decimal, options.missing_values, places
+        raw.cells,
+        raw.name,
+        options.drop_bad,
+        options.decimal or raw.decimal,
+        options.missing_values,
+        raw.places,
     )
     if not len(values):
         raise InputError(
-            f"Expected samples. Received: none from {name}. Give a source that holds a series."
+            f"Expected samples. Received: none from {raw.name}. Give a source that holds a series."
         )
-    has_time = is_series and not isinstance(series.index, pd.RangeIndex)
-    if has_time:
-        log, rows = _rows_with_times(series.index, values, name, options, about)
+    kind = SAMPLES if raw.times is None else COUNTED if raw.times.counts else DATES
+    if raw.times is not None:
+        log, rows = _rows_with_times(raw, values, options)
     elif options.interval_s is not None:
         raise InputError(
-            f"Expected times with interval_s (--interval). Received: {name} without any. Give a time column, or leave it out."
+            f"Expected times with interval_s (--interval). Received: {raw.name} without any. Give "
+            "a time column, or leave it out."
         )
     else:
-        log = CleaningLog(None, about.get("findings", ()), places)
-        log.findings.insert(
-            0, Finding("clock", 1, "no clock: samples are counted", details={"column": None})
-        )
+        log = CleaningLog(None, raw.findings, raw.places)
+        found = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
+        log.findings.insert(0, found)
         numbers = np.arange(len(values))
-        begin = (
-            series.index.start if is_series and series.index.step == 1 else 0
-        )  # a slice of a longer series keeps its sample numbers
         rows = pd.DataFrame(
-            {"time": (numbers + begin) * UNITS_NS["s"], "value": values, "row": numbers}
+            {"time": (numbers + raw.first) * UNITS_NS["s"], "value": values, "row": numbers}
         )
     log.findings += noted
 
     base = int(rows["time"].iloc[0])
     parts, used, interval = regularise(
-        rows.assign(time=rows["time"] - base), bad, log, name, options
+        rows.assign(time=rows["time"] - base), bad, log, raw.name, options
     )
-    describe_values(parts, values[np.isfinite(values)], log)
+    if describe:
+        describe_values(parts, values[np.isfinite(values)], log)
 
-    first = parts[0].begin if has_time else -base
-    start = iso_time(base + round(first)) if has_time else None
-    telemetry = [
-        Telemetry(
-            part.values.astype(np.float32), interval / 1e9, (part.begin - first) / 1e9, start, name
-        )
-        for part in parts
-    ]
+    first = -base if kind == SAMPLES else parts[0].begin
+    clock = Clock(interval / 1e9, 0 if kind == SAMPLES else base + round(first), kind)
+    telemetry = Telemetry(
+        tuple(
+            Part(
+                part.values.astype(np.float32)[:, None],
+                (part.begin - first) / 1e9,
+                measured=None if part.measured.all() else part.measured[:, None],
+            )
+            for part in parts
+        ),
+        (raw.name,),
+        clock,
+    )
     report = Report(
-        name,
+        raw.name,
         len(values),
         used,
-        sum(map(len, telemetry)),
         len(telemetry),
-        interval / 1e9,
+        len(parts),
+        clock.interval_s,
         tuple(log.findings),
     )
     return Cleaned(telemetry, report)
 
 
 def _rows_with_times(
-    index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]
+    raw: RawChannel, values: np.ndarray, options: Cleaning
 ) -> tuple[CleaningLog, pd.DataFrame]:
-    """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
-    places = about.get("places", ROWS)
-    parsed = parse_times(
-        index, f"the times of {name}", options.drop_bad, options.time_format, places
-    )
-    stamps, bad, column = (
-        parsed.stamps,
-        parsed.bad,
-        "the index" if index.name is None else repr(str(index.name)),
-    )
-    clock = about.get("clock") or {
-        "column": column,
-        "form": parsed.form,
-        "zone": parsed.zone,
-        "counts": parsed.counts,
-    }
-    had_time = stamps.notna()
-    local = stamps.tz is None
-    if local and options.timezone:
-        stamps = localize_times(stamps, options.timezone)
-    times = stamps.as_unit("ns").asi8
-    log = CleaningLog(times, about.get("findings", ()), places, clock["counts"])
+    """Returns the cleaning log and the rows that have a time, in chronological order."""
+    bad = raw.times.bad
+    counts = raw.times.counts
+    had_time = raw.times.stamps.notna()
+    zone = raw.times.zone
+    local = raw.times.stamps.tz is None
+    times, kept, since = _in_order(raw.times, options.timezone if local else None)
+    has_time = times != pd.NaT.value
+    log = CleaningLog(times, raw.findings, raw.places, counts)
     for kind, mask, text in (
         ("bad times", bad, "rows whose time cannot be read"),
         ("missing times", ~had_time & ~bad, "rows without a time"),
         (
             "clock change",
-            had_time & stamps.isna(),
+            had_time & ~has_time,
             f"rows at ambiguous or nonexistent local times of {options.timezone}",
         ),
     ):
         log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}", rows_left_out=int(mask.sum()))
-    kept = np.flatnonzero(stamps.notna())
     if not len(kept):
         raise InputError(
-            f"Expected rows with times. Received: none in {name}. Name another time column."
+            f"Expected rows with times. Received: none in {raw.name}. Name another time column."
         )
-    if clock["counts"] or local:
-        refuse_steps_back(times[kept], kept, log, name, options.timezone is not None)
+    if counts or local:
+        rows = np.flatnonzero(has_time)
+        refuse_steps_back(times[rows], rows, log, raw.name, options.timezone is not None)
     if local:
-        clock = clock | {"zone": f"{options.timezone or 'UTC'}, as none is stated"}
-    elif options.timezone and clock["zone"] != "none":
-        clock = clock | {"zone": f"{clock['zone']}, which goes before {options.timezone}"}
-    early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
-    log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
-    kept = kept[np.argsort(times[kept], kind="stable")]
-    first, last = int(times[kept[0]]), int(times[kept[-1]])
+        zone = f"{options.timezone or 'UTC'}, as none is stated"
+    elif options.timezone and zone != "none":
+        zone = f"{zone}, which goes before {options.timezone}"
+    if (np.diff(kept) < 0).any():
+        early = np.flatnonzero(times < np.maximum.accumulate(times))
+        early = early[has_time[early]]
+        log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
+    first = int(since[0])
+    last = int(since[-1])
     span = (
         f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s"
-        if clock["counts"]
+        if counts
         else f"from {iso_time(first)} to {iso_time(last)}"
     )
-    text = f"the clock is {clock['column']}: {clock['form']}, zone {clock['zone']}, {span}"
-    log.findings.insert(
-        0, Finding("clock", 1, text, details=clock | {"first_ns": first, "last_ns": last})
-    )
-    return log, pd.DataFrame({"time": times[kept], "value": values[kept], "row": kept})
+    text = f"the clock is {raw.clock}: {raw.times.form}, zone {zone}, {span}"
+    details = {"column": raw.clock, "form": raw.times.form, "zone": zone, "counts": counts}
+    details |= {"first_ns": first, "last_ns": last}
+    log.findings.insert(0, Finding("clock", 1, text, details=details))
+    columns = {"time": since, "value": values[kept], "row": kept}
+    return log, pd.DataFrame(columns, copy=False)
+
+
+@functools.lru_cache(1)
+def _in_order(times: Times, zone: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns the times of all rows in nanoseconds, the rows that have one in chronological order,
+    and the times of these. The last result is kept for the other channels of a table.
+    """
+    stamps = times.stamps if zone is None else localize_times(times.stamps, zone)
+    since = stamps.as_unit("ns").asi8
+    rows = np.flatnonzero(stamps.notna())
+    if (np.diff(since[rows]) < 0).any():
+        rows = rows[np.argsort(since[rows], kind="stable")]
+    return since, rows, since[rows]

@@ -1,7 +1,7 @@
 """Parses a raw column as numbers, including text, objects and decimal commas.
 
-An empty cell is a missing value. A cell that cannot be parsed either raises an `InputError` that names its row or is marked, so
-that the caller can count it.
+An empty cell is a missing value. A cell that cannot be parsed either raises an `InputError` that
+names its row or is marked, so that the caller can count it.
 """
 
 import decimal as decimal_module
@@ -18,15 +18,23 @@ from enhsim_tf.telemetry.cleaning.report import ROWS, Finding, Places
 
 _MISSING = ("", "na", "n/a", "#n/a", "<na>", "null", "none", "nat")
 _C_NAN = r"[+-]?(?:nan(?:\([a-z0-9_]*\))?|1\.#(?:qnan|snan|ind|nan)0*)"  # as printf of C writes NaN
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _INFINITE = r"[+-]?inf(?:inity)?"
 _COMMA = r"[+-]?(?:0?|[1-9]\d*|[1-9]\d{0,2}(?:\.\d{3})+),\d+(?:[eE][+-]?\d+)?"  # not +0123,1
 _COMMA_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+"
 _POINT_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+"
 _BOTH = rf"{_COMMA_THOUSANDS}\.\d*"  # 1,234.5 shows that commas separate thousands
 _WHOLE = r"[+-]?\d+"
-_GROUPED = r"[+-]?[1-9]\d{0,2}(?:['\u2019 \u00a0\u202f]\d{3})+(?:[.,]\d+)?"  # thousands apart by apostrophes or blanks
-_UNIT = r"[+-]?[\d.,'\u2019\s]*[\d.](?:[eE][+-]?\d+)?( ?(?:[%\u2030\u00b0]|[^\W\d_])(?:[^\d:]|\d(?!\d))*)$"  # behind a number
+# thousands apart by apostrophes or blanks
+_GROUPED = r"[+-]?[1-9]\d{0,2}(?:['\u2019 \u00a0\u202f]\d{3})+(?:[.,]\d+)?"
+# behind a number
+_UNIT = (
+    r"[+-]?[\d.,'\u2019\s]*[\d.](?:[eE][+-]?\d+)?"
+    r"( ?(?:[%\u2030\u00b0]|[^\W\d_])(?:[^\d:]|\d(?!\d))*)$"
+)
+SIGNS = ({"decimal": "."}, {"decimal": ","})
+"""The options of the decimal sign."""
+_CURRENCY = r"^[$\u20ac\u00a3\u00a5] ?(?=[\d.,])"
 _LARGEST = float(np.finfo(np.float32).max)
 
 
@@ -44,20 +52,25 @@ def parse_numbers(
     Args:
         values: The column.
         what: Description of the source, for messages.
-        drop: Whether a value that is no number in the range of float32 is marked and taken as missing, instead of refused.
-        decimal: Decimal sign of text; the other sign separates thousands. None: inferred from the text.
+        drop: Whether a value that is no number in the range of float32 is marked and taken as
+            missing, instead of refused.
+        decimal: Decimal sign of text; the other sign separates thousands. None: inferred from the
+            text.
         missing_values: Numbers and text that mean "no value".
         places: Where the rows are in their file, for messages.
         units: Whether text such as 23.5 °C is a number, if most cells have the same unit.
 
     Returns:
-        float64 values with NaN where missing, the mask of values that could not be parsed, and findings for the cleaning log.
+        float64 values with NaN where missing, the mask of values that could not be parsed, and
+        findings for the cleaning log.
     """
     values = as_column(values, what)
     is_plain = pd.api.types.is_numeric_dtype(values.dtype) and values.dtype.kind not in "bc"
     if not (is_plain or is_text(values)):
         raise InputError(
-            f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column."
+            f"Expected numbers. Received: dtype {values.dtype} from {what}.",
+            [{"states": True}] if values.dtype == bool else (),
+            "a numeric column",
         )
     cells = (
         pd.Series(values.to_numpy(np.float64, na_value=np.nan))
@@ -66,38 +79,44 @@ def parse_numbers(
     )
     cells, findings = _without(cells, missing_values)
     if is_plain:
-        parsed, bad = cells.to_numpy(), np.zeros(len(cells), bool)
+        parsed = cells.to_numpy()
+        bad = np.zeros(len(cells), bool)
     else:
         parsed, bad, noted = _parse_text_numbers(cells, decimal, units)
         findings += noted
     beyond = np.isfinite(parsed) & (np.abs(parsed) > _LARGEST)
-    if (bad | beyond).any() and not drop:
-        row = int(np.argmax(bad | beyond))
+    wrong = bad | beyond
+    if not wrong.any():
+        return parsed, wrong, findings
+    if not drop:
+        row = int(np.argmax(wrong))
         expected = f"values that float32 holds, up to {_LARGEST:.1e}" if beyond[row] else "numbers"
         raise InputError(
-            f"Expected {expected}. Received: {format_cell(values.iloc[row])} at {places.of(row)} of {what} "
-            f"({int((bad | beyond).sum()):,} in all). {_advice(values.iloc[row])}"
+            f"Expected {expected}. Received: {format_cell(values.iloc[row])} at {places.of(row)} "
+            f"of {what} ({int(wrong.sum()):,} in all).",
+            _options(values[wrong].iloc[:1_000], decimal),
         )
-    return np.where(bad | beyond, np.nan, parsed), bad | beyond, findings
+    return np.where(wrong, np.nan, parsed), wrong, findings
 
 
 def as_column(values: Any, what: str) -> pd.Series:
-    """Converts values to a Series with rows counted from 0; raises an `InputError` if they are not one-dimensional."""
+    """Converts values to a Series with rows counted from 0; raises an `InputError` if they are not
+    one-dimensional.
+    """
     if isinstance(values, pd.DataFrame) or np.ndim(values) != 1:
         raise InputError(
-            f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from {what}. Name one column."
+            f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from "
+            f"{what}. Name one column."
         )
     try:
         cells = pd.Series(values).reset_index(drop=True)
         return cells.astype(object) if isinstance(cells.dtype, pd.CategoricalDtype) else cells
-    except (
-        ValueError,
-        TypeError,
-        NotImplementedError,
-    ) as error:  # types that pandas does not support
+    # types that pandas does not support
+    except (ValueError, TypeError, NotImplementedError) as error:
         reason = (str(error).splitlines() or [""])[0]
         raise InputError(
-            f"Expected one plain column. Received: {type(values).__name__} from {what} ({reason}). Name one column."
+            f"Expected one plain column. Received: {type(values).__name__} from {what} ({reason}). "
+            "Name one column."
         ) from None
 
 
@@ -153,14 +172,19 @@ def _without(
     return cells.mask(found), [Finding("missing words", int(found.sum()), text)]
 
 
-def _advice(cell: Any) -> str:
-    if isinstance(cell, str) and re.fullmatch(f"{_COMMA_THOUSANDS}|{_COMMA}", cell.strip()):
-        return "Give decimal (--decimal , or --decimal .), or leave them out with drop_bad=True (--drop-bad)."
-    return "Correct them, name words with missing_values (--missing-values), or leave them out with drop_bad=True (--drop-bad)."
+def _options(cells: pd.Series, decimal: str | None) -> list[dict[str, Any]]:
+    """What may be given for cells that are no numbers."""
+    words = list(dict.fromkeys(str(cell).strip() for cell in cells))
+    if re.fullmatch(f"{_COMMA_THOUSANDS}|{_COMMA}", words[0]):
+        return [sign for sign in SIGNS if sign["decimal"] != decimal]
+    is_short = len(words) <= 3 and all(0 < len(word) <= 20 and "," not in word for word in words)
+    return [{"drop_bad": True}, *([{"missing_values": words}] if is_short else [])]
 
 
 def shows_comma(text: pd.Series) -> bool:
-    """Whether text without missing cells has numbers whose comma can only be a decimal sign, such as 20,5, but not 1,500."""
+    """Whether text without missing cells has numbers whose comma can only be a decimal sign, such
+    as 20,5, but not 1,500.
+    """
     cells = text.str.strip()
     commas = cells[cells.str.fullmatch(_COMMA).to_numpy(bool)]
     return (
@@ -176,14 +200,17 @@ def has_commas(text: pd.Series) -> bool:
 
 
 def allows_point_thousands(text: pd.Series) -> bool:
-    """Whether every point in text without missing cells may separate thousands, such as in 1.200 and 999."""
+    """Whether every point in text without missing cells may separate thousands, such as in 1.200
+    and 999.
+    """
     return bool(text.str.strip().str.fullmatch(f"{_POINT_THOUSANDS}|{_WHOLE}|{_COMMA}").all())
 
 
 def _parse_text_numbers(
     cells: pd.Series, decimal: str | None, units: bool
 ) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
-    parsed, bad = np.full(len(cells), np.nan), np.zeros(len(cells), bool)
+    parsed = np.full(len(cells), np.nan)
+    bad = np.zeros(len(cells), bool)
     left = ~is_missing(cells)
     of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
     for row in np.flatnonzero(left & ~of_text):
@@ -206,10 +233,12 @@ def _parse_text_numbers(
         ",", ".", regex=False
     )
     parsed[rows[readable]] = text.astype(np.float64)
+    # 1e999
     overflows = np.isinf(parsed[rows[readable]]) & ~text.str.contains("inf", case=False).to_numpy(
         bool
-    )  # 1e999
-    bad[rows[~readable]], bad[rows[readable][overflows]] = True, True
+    )
+    bad[rows[~readable]] = True
+    bad[rows[readable][overflows]] = True
     findings = (
         [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")]
         if count
@@ -224,22 +253,30 @@ def _parse_text_numbers(
 
 
 def _without_unit(text: pd.Series) -> tuple[pd.Series, str]:
-    """Takes off the unit that most cells have, and returns it; cells with another one or none are then no numbers."""
+    """Takes off the unit that most cells have, and returns it; cells with another one or none are
+    then no numbers.
+    """
+    if text.str.contains(_CURRENCY).mean() > 0.5:
+        sign = text.iloc[0][0]
+        return text.str.removeprefix(sign).str.lstrip().where(text.str.startswith(sign), "?"), sign
     found = text.iloc[:1_000].str.extract(f"^{_UNIT}", expand=False).mode()
     if not len(found):
         return text, ""
     has_it = text.str.endswith(found.iloc[0]).to_numpy(bool)
+    # words: 10 cm or 2a
     if (
         has_it.sum() <= len(text) / 2
         or text[has_it].nunique() <= 10
         or not text.str.contains("[., %\u00b0]").any()
-    ):  # words: 10 cm or 2a
+    ):
         return text, ""
     return text.str.removesuffix(found.iloc[0]).where(has_it, "?"), found.iloc[0].strip()
 
 
 def _plain(text: pd.Series) -> pd.Series:
-    """Rewrites numbers of other programs: blanks behind the sign, Fortran's exponents, and thousands that are apart by apostrophes or blanks."""
+    """Rewrites numbers of other programs: blanks behind the sign, Fortran's exponents, and
+    thousands that are apart by apostrophes or blanks.
+    """
     odd = text[~text.str.fullmatch(_NUMBER).to_numpy(bool)].str.replace(
         r"^([+-])\s+(?=[\d.])", r"\1", regex=True
     )
@@ -251,7 +288,9 @@ def _plain(text: pd.Series) -> pd.Series:
 
 
 def _sign_of(text: pd.Series) -> str | None:
-    """Returns the decimal sign that a column of text shows. None: points, and no commas that separate thousands."""
+    """Returns the decimal sign that a column of text shows. None: points, and no commas that
+    separate thousands.
+    """
     if text.str.fullmatch(_BOTH).any():
         return "."
     has_points = (

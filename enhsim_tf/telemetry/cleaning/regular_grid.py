@@ -1,6 +1,8 @@
-"""Turns the rows of a raw channel into regular samples: unique times, one sampling interval, parts without long gaps.
+"""Turns the rows of a raw channel into regular samples: unique times, one sampling interval, parts
+without long gaps.
 
-Times are int64 nanoseconds. Each step drops or merges rows, or fills samples, and records this in the `CleaningLog`.
+Times are int64 nanoseconds. Each step drops or merges rows, or fills samples, and records this in
+the `CleaningLog`.
 """
 
 import dataclasses
@@ -13,15 +15,22 @@ from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
 from enhsim_tf.telemetry.windows import runs_of
 
-_ALIKE = (
-    0.8,
-    1.25,
-)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
+# steps within these factors have the same rate; with jitter of a quarter, means of four steps stay
+# inside
+_ALIKE = (0.8, 1.25)
 _RUN = 4  # smallest number of consecutive steps that form a stretch with another rate
-_MAX_JITTER = 0.25  # largest distance of a time from the regular grid, in intervals; the series is split where it is larger
-_LEAST_REGULAR = (
-    0.4  # share of the steps that are whole numbers of intervals; random times reach 0.25
-)
+# largest distance of a time from the regular grid, in intervals; the series is split where it is
+# larger
+_MAX_JITTER = 0.25
+# share of the steps that are whole numbers of intervals; random times reach 0.25
+_LEAST_REGULAR = 0.4
+# a clock of which most steps differ by less than this share from the median has jitter
+_JITTERED = 0.6
+_MOSTLY = 0.9
+# times that leave the grid more often than once in sixteen rows do not keep to it
+_FEW_BREAKS = 0.5
+_SHORT = 8
+_MOSTLY_FILLED = 1 / 3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,9 +39,9 @@ class Part:
 
     begin: float  # time of the first sample in nanoseconds, which need not be whole ones
     values: np.ndarray  # float64
-    source_row: (
-        np.ndarray
-    )  # row of each sample in the source; of a filled one, the last row before it
+    # row of each sample in the source; of a filled one, the last row before it
+    source_row: np.ndarray
+    measured: np.ndarray  # whether it was measured, and not filled in
 
 
 def regularise(
@@ -41,8 +50,8 @@ def regularise(
     """Turns rows into regular parts.
 
     Args:
-        rows: The rows that have a time, in chronological order: `time` in nanoseconds, `value`, NaN or infinite where it is missing, and
-            `row`, their number in the source.
+        rows: The rows that have a time, in chronological order: `time` in nanoseconds, `value`, NaN
+            or infinite where it is missing, and `row`, their number in the source.
         bad: Which rows of the source have a value that cannot be read.
         log: Receives what is found.
         name: Of the channel, for messages.
@@ -51,6 +60,13 @@ def regularise(
     Returns:
         The parts, the number of rows that their samples represent, and the interval in nanoseconds.
     """
+    steps = np.diff(rows["time"])
+    values = rows["value"].to_numpy()
+    step = steps[0] if len(steps) >= options.min_part else 0
+    is_plain = step > 0 and (steps == step).all() and np.isfinite(values).all()
+    if is_plain and options.interval_s in (None, step / 1e9):  # nothing to be done
+        part = Part(0.0, values, rows["row"].to_numpy(), np.ones(len(rows), bool))
+        return [part], len(rows), float(step)
     rows = _drop_duplicate_times(_drop_missing_values(rows, bad, log, name), log, name, options)
     times = rows["time"].to_numpy()
     holds = options.fill == "hold"
@@ -61,18 +77,27 @@ def regularise(
         interval = options.interval_s * 1e9
     elif len(rows) < 2:
         raise InputError(
-            f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s (--interval)."
+            f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}.",
+            otherwise="telemetry with more rows",
         )
     else:
         interval = find_interval(times)
-        if regular_step_fraction(times, interval) < _LEAST_REGULAR:
+        steps = np.diff(times)
+        is_regular = regular_step_fraction(times, interval) >= _LEAST_REGULAR
+        usual = float(np.median(steps))
+        if not is_regular and np.mean(np.abs(steps / usual - 1) < _JITTERED) < _MOSTLY:
+            rounded = {"interval_s": float(f"{usual / 1e9:.3g}")}
             raise InputError(
-                f"Expected roughly regular times. Received: steps from {np.diff(times).min() / 1e9:g} s to "
-                f"{np.diff(times).max() / 1e9:g} s without a common interval, in {name}. "
-                "Give interval_s (--interval), and fill='hold' (--fill hold) for telemetry that is sent only when it changes."
+                "Expected roughly regular times. Received: steps from "
+                f"{steps.min() / 1e9:g} s to {steps.max() / 1e9:g} s without a common interval, in "
+                f"{name}.",
+                [rounded, rounded | {"fill": "hold"}],
+                "--fill hold for telemetry that is sent only when it changes",
             )
         other = np.flatnonzero(_have_other_rate(times, interval))
-        if len(other) and not holds:  # a long step of telemetry that is held is no slower rate
+        if (
+            len(other) and not holds and not by_interval
+        ):  # a long step of telemetry that is held is no slower rate
             by_interval = True
             usual = f"one every {interval / 1e9:.6g} s, to which they are averaged or filled"
             log.add(
@@ -80,13 +105,27 @@ def regularise(
                 rows["row"].to_numpy()[other],
                 f"rows in stretches of another rate than {usual}: {{count}}",
             )
+        begins = _begins(times, interval, _SHORT, by_interval)[1]
+        num_breaks = begins.sum() - (np.round(steps / interval) > _SHORT).sum()
+        if not by_interval and (not is_regular or _SHORT * num_breaks > _FEW_BREAKS * len(times)):
+            by_interval = True
+            interval = float(f"{usual:.6g}")
+            log.add(
+                "jitter",
+                (),
+                f"the steps of the clock vary; rows are averaged or filled at the median rate, one "
+                f"every {interval / 1e9:.6g} s",
+                count=len(times),
+            )
     rows, begins = _on_grids(rows, interval, options.longest_gap + 1, by_interval)
     how = "last" if holds else "mean" if by_interval else options.same_time
     return *_build_parts(rows, begins, interval, log, name, how, options), interval
 
 
 def find_interval(times: np.ndarray) -> float:
-    """Finds the sampling interval, in nanoseconds, that most of at least two rows with different times have."""
+    """Finds the sampling interval, in nanoseconds, that most of at least two rows with different
+    times have.
+    """
     steps = np.sort(np.diff(times).astype(np.float64))
     near = np.searchsorted(steps, _ALIKE[1] * steps, "right") - np.searchsorted(
         steps, _ALIKE[0] * steps, "left"
@@ -97,14 +136,15 @@ def find_interval(times: np.ndarray) -> float:
 
 
 def _refined(times: np.ndarray, interval: float) -> float:
-    """Refines the interval on the longest run without long gaps: the step that 90 % of the rows have, or the slope of a fitted line."""
+    """Refines the interval on the longest run without long gaps: the step that 90 % of the rows
+    have, or the slope of a fitted line.
+    """
     steps = np.diff(times).astype(np.float64)
     numbers = np.round(steps / interval)
     near = (numbers >= 1) & (numbers <= 3)
     first, last = _longest_run(near)
-    sure = _longest_run(
-        near & (np.abs(steps / interval - numbers) <= 0.25)
-    )  # excludes jumps of the clock
+    # excludes jumps of the clock
+    sure = _longest_run(near & (np.abs(steps / interval - numbers) <= 0.25))
     if 2 * (sure[1] - sure[0]) >= last - first:
         first, last = sure
     places = np.concatenate([[0], np.cumsum(numbers[first:last])])
@@ -126,19 +166,26 @@ def _longest_run(marks: np.ndarray) -> tuple[int, int]:
 
 
 def regular_step_fraction(times: np.ndarray, interval: float) -> float:
-    """Fraction of the steps that are close to a whole number of intervals; about a quarter for random times."""
+    """Fraction of the steps that are close to a whole number of intervals; about a quarter for
+    random times.
+    """
     ratios = np.diff(times) / interval
     numbers = np.round(ratios)
     return float(np.mean((numbers >= 1) & (np.abs(ratios - numbers) <= 0.25)))
 
 
 def _have_other_rate(times: np.ndarray, interval: float) -> np.ndarray:
-    """Marks rows in stretches whose steps are all shorter than the interval, or all longer and similar to each other."""
-    ratios, marks = np.diff(times) / interval, np.zeros(len(times), bool)
+    """Marks rows in stretches whose steps are all shorter than the interval, or all longer and
+    similar to each other.
+    """
+    ratios = np.diff(times) / interval
+    marks = np.zeros(len(times), bool)
     if len(ratios) < _RUN:
         return marks
-    windows = np.lib.stride_tricks.sliding_window_view(ratios, _RUN)
-    lowest, highest = windows.min(axis=1), windows.max(axis=1)
+    # one row for each step of a stretch
+    shifted = np.lib.stride_tricks.sliding_window_view(ratios, len(ratios) - _RUN + 1)
+    lowest = shifted.min(axis=0)
+    highest = shifted.max(axis=0)
     starts = np.flatnonzero((highest < _ALIKE[0]) | (lowest > _ALIKE[1]) & (highest < 1.3 * lowest))
     marks[(starts[:, None] + np.arange(_RUN + 1)).ravel()] = True
     return marks
@@ -173,7 +220,11 @@ def _drop_missing_values(
 def _drop_duplicate_times(
     rows: pd.DataFrame, log: CleaningLog, name: str, options: Cleaning
 ) -> pd.DataFrame:
-    """Keeps one row for each time. A mean that would merge most rows must be asked for, by an interval."""
+    """Keeps one row for each time. A mean that would merge most rows must be asked for, by an
+    interval.
+    """
+    if (np.diff(rows["time"]) > 0).all():
+        return rows
     is_copy = rows.duplicated(["time", "value"])
     copies = rows["row"][is_copy].to_numpy()
     log.add(
@@ -190,17 +241,27 @@ def _drop_duplicate_times(
         and 2 * len(left) >= len(rows) > 2
     ):
         raise InputError(
-            f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
-            "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval)."
+            f"Expected a time for each row. Received: {len(rows):,} rows of {name} with "
+            f"{len(kept):,} different times, as of several series, or of a clock that lost digits.",
+            [{"interval_s": float(f"{np.median(np.diff(kept['time'])) / 1e9:.6g}")}]
+            if len(kept) > 1
+            else (),
+            "--series-column with the column that tells series apart",
         )
-    text = f"rows with another value at the same time, of which the {options.same_time} was taken: {{count}}"
+    text = (
+        f"rows with another value at the same time, of which the {options.same_time} was taken: "
+        f"{{count}}"
+    )
     log.add("same time", left, text, rows_left_out=len(left))
     return kept
 
 
 def _merge_groups(rows: pd.DataFrame, by: list[str], how: str) -> tuple[pd.DataFrame, np.ndarray]:
-    """Merges rows that are equal in some columns into one row; also returns the source rows that were merged into others."""
-    is_left = rows.duplicated(by, keep="last" if how == "last" else "first")
+    """Merges rows that follow each other and are equal in some columns into one row; also returns
+    the source rows that were merged into others.
+    """
+    is_same = np.all([np.diff(rows[name]) == 0 for name in by], axis=0)
+    is_left = np.append(is_same, False) if how == "last" else np.append(False, is_same)
     kept = rows[~is_left]
     if how == "mean" and is_left.any():
         kept = kept.assign(value=rows.groupby(by)["value"].mean().to_numpy())
@@ -210,15 +271,42 @@ def _merge_groups(rows: pd.DataFrame, by: list[str], how: str) -> tuple[pd.DataF
 def _on_grids(
     rows: pd.DataFrame, interval: float, max_step: int, by_interval: bool
 ) -> tuple[pd.DataFrame, np.ndarray]:
-    """Splits a series at gaps of more than `max_step` intervals and assigns every row to a point of a regular grid.
+    """Splits a series at gaps of more than `max_step` intervals and assigns every row to a point of
+    a regular grid.
 
-    With `by_interval`, this is the nearest point of one grid that starts at the first row. Otherwise each part has a grid of its own, and
-    the series is also split where its times leave that grid, as at jumps of the clock.
+    With `by_interval`, this is the nearest point of one grid that starts at the first row.
+    Otherwise each part has a grid of its own, and the series is also split where its times leave
+    that grid, as at jumps of the clock.
 
     Returns:
-        The rows with the number of their `part`, their `place` on its grid and their distance from that, `off`; the beginning of each part.
+        The rows with the number of their `part`, their `place` on its grid and their distance from
+        that, `off`; the beginning of each part.
     """
     times = rows["time"].to_numpy()
+    places, begins = _begins(times, interval, max_step, by_interval)
+    part = np.cumsum(begins)
+    firsts = np.append(0, np.flatnonzero(begins))
+    place = places - places[firsts][part]
+    off = times - times[firsts][part] - place * interval
+    if by_interval:
+        middle = times[0] + places[firsts] * interval - times[firsts]
+    else:
+        parts = pd.Series(off).groupby(part, sort=False)
+        low, middle, high = (parts.agg(name).to_numpy() for name in ("min", "median", "max"))
+        middle = np.where(
+            np.maximum(high - middle, middle - low) <= _MAX_JITTER * interval,
+            middle,
+            (low + high) / 2,
+        )
+    return rows.assign(part=part, place=place, off=off - middle[part]), times[firsts] + middle
+
+
+def _begins(
+    times: np.ndarray, interval: float, max_step: int, by_interval: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the number of intervals from the first row to each, rounded, and marks the rows with
+    which a new part begins; see `_on_grids`.
+    """
     steps = (
         (times - times[0]) / interval
         if by_interval
@@ -228,31 +316,29 @@ def _on_grids(
     begins = np.diff(places, prepend=places[0]) > max_step
     if not by_interval:
         _mark_spread(times - places * interval, begins, 2 * _MAX_JITTER * interval + 0.5)
-    part = np.cumsum(begins)
-    firsts = np.append(0, np.flatnonzero(begins))
-    place = places - places[firsts][part]
-    off = times - times[firsts][part] - place * interval
-    if by_interval:
-        middle = times[0] + places[firsts] * interval - times[firsts]
-    else:
-        low, middle, high = (
-            pd.Series(off).groupby(part).agg(each).to_numpy() for each in ("min", "median", "max")
-        )
-        middle = np.where(
-            np.maximum(high - middle, middle - low) <= _MAX_JITTER * interval,
-            middle,
-            (low + high) / 2,
-        )
-    return rows.assign(part=part, place=place, off=off - middle[part]), times[firsts] + middle
+    return places, begins
 
 
 def _mark_spread(off: np.ndarray, begins: np.ndarray, spread: float) -> None:
-    """Marks further beginnings of parts, so that the distances from the grid within each part differ by at most `spread`."""
-    low = high = off[0]
-    for row, value in enumerate(off.tolist()):
-        low, high = min(low, value), max(high, value)
-        if begins[row] or high - low > spread:
-            begins[row], low, high = True, value, value
+    """Marks further beginnings of parts, so that the distances from the grid within each part
+    differ by at most `spread`.
+    """
+    first = 0
+    length = 64
+    ends = np.append(np.flatnonzero(begins), len(off))
+    for end in ends[ends > 0].tolist():
+        while first < end:
+            run = off[first : min(end, first + length)]
+            is_beyond = np.maximum.accumulate(run) - np.minimum.accumulate(run) > spread
+            if is_beyond.any():
+                first = first + int(np.argmax(is_beyond))
+                length = 64
+                begins[first] = True
+            elif first + length >= end:
+                first = end
+                length = 64
+            else:
+                length *= 2
 
 
 def _build_parts(
@@ -264,47 +350,76 @@ def _build_parts(
     how: str,
     options: Cleaning,
 ) -> tuple[list[Part], int]:
-    """Builds regular parts, fills their short gaps, and counts the rows that they use. Of several rows at one grid point, one is kept."""
+    """Builds regular parts, fills their short gaps, and counts the rows that they use. Of several
+    rows at one grid point, one is kept.
+    """
     lengths = rows.groupby("part")["place"].max().to_numpy() + 1
     if (longest := lengths.max()) < options.min_part:
         raise InputError(
-            f"Expected regular samples, at least {options.min_part} in a row. Received: {longest} at most, every {interval / 1e9:.6g} s, in {name}. "
-            "Give interval_s (--interval), a longer max_fill (--max-fill), or a smaller min_part (of `fit`, --window)."
+            f"Expected regular samples, at least {options.min_part} in a row. Received: {longest} "
+            f"at most, every {interval / 1e9:.6g} s, in {name}.",
+            [
+                {"max_fill": 10 * max(1, options.longest_gap)},
+                *(
+                    [{"interval_s": float(f"{10 * interval / 1e9:.6g}")}]
+                    if log.times is not None
+                    else []
+                ),
+            ],
+            "a smaller --window to fit",
         )
     _log_breaks(rows, interval, log, options.longest_gap)
     is_short = lengths < options.min_part
-    short, rows = rows["row"][is_short[rows["part"]]].to_numpy(), rows[~is_short[rows["part"]]]
+    short = rows["row"][is_short[rows["part"]]].to_numpy()
+    rows = rows[~is_short[rows["part"]]]
     _log_jitter(rows, interval, log)
     rows, merged = _merge_groups(rows, ["part", "place"], how)
     text = f"rows that share an interval with another row, of which the {how} was taken: {{count}}"
     log.add("averaged", merged, text, rows_left_out=len(merged))
-    text = f"rows in parts of fewer than {options.min_part:,} samples ({counted(is_short.sum(), 'such part')}): {{count}}"
+    text = (
+        f"rows in parts of fewer than {options.min_part:,} samples "
+        f"({counted(is_short.sum(), 'such part')}): {{count}}"
+    )
     log.add("short parts", short, text, rows_left_out=len(short))
-    parts, holds = [], options.fill == "hold"
+    parts = []
+    holds = options.fill == "hold"
     for number, inside in rows.groupby("part"):
-        places, values, samples = (
-            inside["place"].to_numpy(),
-            inside["value"].to_numpy(),
-            np.arange(lengths[number]),
-        )
+        places = inside["place"].to_numpy()
+        values = inside["value"].to_numpy()
+        samples = np.arange(lengths[number])
         previous = np.searchsorted(places, samples, "right") - 1
         filled = values[previous] if holds else np.interp(samples, places, values)
-        parts.append(Part(begins[number], filled, inside["row"].to_numpy()[previous]))
+        rows_there = inside["row"].to_numpy()[previous]
+        parts.append(Part(begins[number], filled, rows_there, places[previous] == samples))
     num_filled = int(lengths[~is_short].sum()) - len(rows)
     is_gap = (np.diff(rows["part"]) == 0) & (np.diff(rows["place"]) > 1)
     filled = "filled with the value before them," if holds else "filled by straight lines with"
-    text = f"gaps of up to {counted(options.longest_gap, 'sample')}, {filled} {counted(num_filled, 'sample')} in total: {{count}}"
+    text = (
+        f"gaps of up to {counted(options.longest_gap, 'sample')}, {filled} "
+        f"{counted(num_filled, 'sample')} in total: {{count}}"
+    )
     log.add("gaps filled", rows["row"].to_numpy()[:-1][is_gap], text, samples_filled=num_filled)
+    if num_filled > _MOSTLY_FILLED * (share := num_filled + len(rows)):
+        text = (
+            f"{num_filled / share:.0%} of the samples are filled in and were not measured: give a "
+            "longer --interval, or a smaller --max-fill"
+        )
+        log.add("mostly filled", (), text, count=num_filled)
     return parts, len(rows)
 
 
 def _log_breaks(rows: pd.DataFrame, interval: float, log: CleaningLog, max_fill: int) -> None:
     before = np.flatnonzero(np.diff(rows["part"]))
-    steps, numbers = np.diff(rows["time"])[before] / interval, rows["row"].to_numpy()[before]
+    steps = np.diff(rows["time"])[before] / interval
+    numbers = rows["row"].to_numpy()[before]
     is_gap = np.round(steps) > max_fill + 1
     unit = 1.0 if log.times is None else interval / 1e9
-    longest, what = steps.max(initial=0) * unit, "samples" if log.times is None else "s"
-    text = f"gaps of more than {counted(max_fill, 'sample')}, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
+    longest = steps.max(initial=0) * unit
+    what = "samples" if log.times is None else "s"
+    text = (
+        f"gaps of more than {counted(max_fill, 'sample')}, the longest {longest:.6g} {what}, at "
+        f"which the series is split: {{count}}"
+    )
     log.add("gaps", numbers[is_gap], text, details={"longest": float(longest)})
     log.add(
         "clock steps", numbers[~is_gap], "jumps of the clock, at which the series is split: {count}"
@@ -316,5 +431,8 @@ def _log_jitter(rows: pd.DataFrame, interval: float, log: CleaningLog) -> None:
     snapped = np.flatnonzero(share > 1e-3)  # smaller deviations come from rounded times
     largest = float(share.max()) * interval / 1e9
     worst = rows["row"].to_numpy()[snapped[np.argsort(-share[snapped], kind="stable")]]
-    text = f"times off the regular grid, by up to {largest:.4g} s ({share.max():.0%} of an interval), snapped to it: {{count}}"
+    text = (
+        f"times off the regular grid, by up to {largest:.4g} s ({share.max():.0%} of an interval), "
+        f"snapped to it: {{count}}"
+    )
     log.add("jitter", worst, text, details={"largest_s": largest})

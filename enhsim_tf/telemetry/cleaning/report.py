@@ -1,6 +1,8 @@
-"""The log of cleaning actions and the report made from it: what was accepted, repaired or left out, how often and where.
+"""The log of cleaning actions and the report made from it: what was accepted, repaired or left out,
+how often and where.
 
-The report accounts for every row and sample: rows in = rows used + rows left out, and samples = rows used + samples filled in.
+The report accounts for every row and sample: rows in = rows used + rows left out, and samples =
+rows used + samples filled in.
 """
 
 import dataclasses
@@ -10,46 +12,50 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import counted, printable, spoken
+from enhsim_tf.common.errors import MANY, counted, printable, spoken
+from enhsim_tf.telemetry.series import iso_time
 
 _ACTIONS = {
-    "accepted": "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, own columns, series, "
-    "columns left out, commands, decimal comma, units, fill values, missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level",
+    "accepted": (
+        "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, "
+        "own columns, series, columns left out, commands, decimal comma, units, fill values, "
+        "missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level, "
+        "counter, states"
+    ),
+    "WARNING": "mostly filled",
     "repaired": "unsorted, other rates, jitter, gaps filled",
-    "left out": "padding, missing times, bad times, clock change, duplicate rows, same time, missing values, bad values, averaged, short parts",
+    "left out": (
+        "ragged lines, padding, missing times, bad times, clock change, duplicate rows, same time, "
+        "missing values, bad values, averaged, short parts"
+    ),
 }
 KINDS = {kind: action for action, kinds in _ACTIONS.items() for kind in kinds.split(", ")}
 """What was done about each kind of finding."""
 _NUM_PLACES = 3  # places named in each finding
+_SUMS = ("rows_in", "rows_used", "samples", "samples_filled")
 
 
-class Places(list):
-    """Where the rows of a channel are: `[first row, its line, name of the file]` of each file, in the order of the rows.
-
-    It is a list because pandas writes the attributes of a Series as JSON. Without files, rows are counted from 0.
+@dataclasses.dataclass(frozen=True, eq=False)
+class Places:
+    """Where the rows of a channel are. Without files, rows are counted from 0.
 
     Args:
-        files: The files.
-        rows: Row of the table for each row of the channel, shape `(rows,)`, if a table holds several series. None: they are equal.
+        files: First row, its line, and name of each file, in the order of the rows.
+        rows: Row of the table for each row of the channel, shape `(rows,)`, if a table holds
+            several series. None: they are equal.
     """
 
-    def __init__(self, files: Sequence[Sequence[Any]] = (), rows: np.ndarray | None = None):
-        super().__init__(map(list, files))
-        self.rows = rows
-
-    __hash__ = object.__hash__  # never changed, and a default of dataclasses
-
-    def __deepcopy__(self, memo: dict) -> "Places":
-        return self  # pandas copies attributes with every operation
+    files: tuple[tuple[int, int, str], ...] = ()
+    rows: np.ndarray | None = None
 
     def of(self, row: int) -> str:
         """Describes a row of the channel, counted from 0, for messages."""
         row = int(row) if self.rows is None else int(self.rows[row])
-        inside = [each for each in self if each[0] <= row]
-        if not inside:
+        before = [file for file in self.files if file[0] <= row]
+        if not before:
             return f"row {row}"
-        first, line, name = inside[-1]
-        return f"line {row - first + line}" + (f" of {name}" if len(self) > 1 else "")
+        first, line, name = before[-1]
+        return f"line {row - first + line}" + (f" of {name}" if len(self.files) > 1 else "")
 
 
 ROWS = Places()
@@ -65,9 +71,8 @@ class Finding:
     places: tuple[str, ...] = ()  # the first few where it was found
     rows_left_out: int = 0  # rows that are not represented by a sample
     samples_filled: int = 0  # samples that do not represent a row
-    details: Mapping[str, Any] = dataclasses.field(
-        default_factory=dict
-    )  # further numbers, in plain JSON types
+    # further numbers, in plain JSON types
+    details: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     @property
     def action(self) -> str:
@@ -93,7 +98,8 @@ class Report:
     rows_used: int  # rows that are represented by a sample of the result
     samples: int  # samples in the result, over all parts
     num_parts: int
-    interval_s: float  # sampling interval of the result in seconds, or in samples if the source has no times
+    # sampling interval of the result in seconds, or in samples if the source has no times
+    interval_s: float
     findings: tuple[Finding, ...]  # the entries of the cleaning log
 
     @property
@@ -113,9 +119,16 @@ class Report:
     @property
     def summary(self) -> str:
         """The counts of rows and samples."""
-        filled = f", {self.samples_filled:,} of them filled in" if self.samples_filled else ""
-        rows = f"{counted(self.rows_in, 'row')}, {self.rows_used:,} used, {self.rows_left_out:,} left out"
-        return f"{rows}; {counted(self.samples, 'sample')} in {counted(self.num_parts, 'part')}{filled}"
+        share = self.samples_filled / max(1, self.samples)
+        filled = f", {self.samples_filled:,} of them ({share:.1%}) filled in" if share else ""
+        rows = (
+            f"{counted(self.rows_in, 'row')}, {self.rows_used:,} used, {self.rows_left_out:,} left "
+            "out"
+        )
+        return (
+            f"{rows}; {counted(self.samples, 'sample')} in "
+            f"{counted(self.num_parts, 'part')}{filled}"
+        )
 
     def lines(self) -> list[str]:
         """The report as text: a summary, then one line for each finding."""
@@ -132,37 +145,68 @@ class Report:
 
 
 def lines_of(reports: Sequence[Report]) -> list[str]:
-    """The reports of one or several channels as text; what several channels share is said once."""
+    """The reports of one or several channels as text. What several channels share is said once, and
+    of many channels, what is alike in several: the warnings come first.
+    """
     owners: dict[str, list[str]] = {}
     for report in reports:
         for text in (report.summary, *(finding.line() for finding in report.findings)):
             owners.setdefault(text, []).append(report.channel)
-    is_named = [len(reports) > 1 or text == reports[0].summary for text in owners]
+    if len(reports) > MANY:
+        owners = _alike(reports, owners)
+    texts = sorted(owners, key=lambda text: not text.startswith("WARNING"))
     lines = [
-        f"{spoken(names)}: {text}" if named else text
-        for (text, names), named in zip(owners.items(), is_named, strict=True)
+        f"{spoken(owners[text])}: {text}"
+        if len(reports) > 1 or text == reports[0].summary
+        else text
+        for text in texts
     ]
-    return [
-        printable(line) for line in lines
-    ]  # names of channels and columns may contain control characters
+    # names of channels and columns may contain control characters
+    return [printable(line) for line in lines]
+
+
+def _alike(
+    reports: Sequence[Report], owners: Mapping[str, Sequence[str]]
+) -> dict[str, Sequence[str]]:
+    """Keeps what all channels share, and says of the rest how many channels have findings of a
+    kind, with the first of them.
+    """
+    shared = {text: names for text, names in owners.items() if len(names) == len(reports)}
+    by_kind: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for report in reports:
+        for finding in report.findings:
+            if finding.line() not in shared:
+                found = by_kind.setdefault((finding.action, finding.kind), [])
+                found.append((report.channel, finding.text))
+    if reports[0].summary not in shared:
+        sums = [sum(getattr(report, name) for report in reports) for name in _SUMS]
+        text = "rows {:,}, used {:,}, samples {:,}, filled in {:,}, in total".format(*sums)
+        shared = {text: [report.channel for report in reports]} | shared
+    for (action, kind), found in by_kind.items():
+        first = ", ".join(name for name, _ in found[:3])
+        text = f"{action}: {kind} in {len(found):,} of them ({first}), the first: {found[0][1]}"
+        shared[text] = [report.channel for report in reports]
+    return shared
 
 
 class CleaningLog:
     """The log of cleaning actions: collects findings with their places in the source.
 
-    `times` are those of all rows in the order of the source, int64 nanoseconds since 1970, or None; `findings` are the fields of those made
-    while reading; `counts` as in `times.Times`.
+    `times` are those of all rows in the order of the source, int64 nanoseconds since 1970, or None;
+    `findings` are those made while reading; `counts` as in `times.Times`.
     """
 
     def __init__(
         self,
         times: np.ndarray | None,
-        findings: Sequence[Mapping[str, Any]] = (),
+        findings: Sequence[Finding] = (),
         places: Places = ROWS,
         counts: bool = False,
     ):
-        self.times, self.places, self.counts = times, places, counts
-        self.findings = [Finding(**each) for each in findings]
+        self.times = times
+        self.places = places
+        self.counts = counts
+        self.findings = list(findings)
 
     def place(self, row: int) -> str:
         """Describes a row of the source by its place and its time."""
@@ -180,7 +224,8 @@ class CleaningLog:
         count: int | None = None,
         **numbers: Any,
     ) -> None:
-        """Adds a finding made at rows of the source, unless its count, by default the number of these rows, is 0.
+        """Adds a finding made at rows of the source, unless its count, by default the number of
+        these rows, is 0.
 
         `{count}` in the text becomes the count; `numbers` are the other fields of the `Finding`.
         """
@@ -190,8 +235,3 @@ class CleaningLog:
             self.findings.append(
                 Finding(kind, int(count), text.replace("{count}", f"{count:,}"), places, **numbers)
             )
-
-
-def iso_time(nanoseconds: int) -> str:
-    """Formats a time in nanoseconds since 1970 as ISO 8601 text in UTC."""
-    return pd.Timestamp(int(nanoseconds), tz="UTC").isoformat()

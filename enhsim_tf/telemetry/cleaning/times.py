@@ -1,12 +1,15 @@
-"""Parses a raw column as times: date-times, dates as text, durations, numbers since 1970 or any other zero, days of spreadsheets.
+"""Parses a raw column as times: date-times, dates as text, durations, numbers since 1970 or any
+other zero, days of spreadsheets.
 
-An empty cell is a missing time. A cell that cannot be parsed either raises an `InputError` that names its place or is marked, so
-that the caller can count it.
+An empty cell is a missing time. A cell that cannot be parsed either raises an `InputError` that
+names its place or is marked, so that the caller can count it.
 """
 
 import dataclasses
 import datetime
+import itertools
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -39,33 +42,46 @@ _DAY_NAMES = {
     "jd": "Julian dates",
     "datenum": "MATLAB's day numbers",
 }
-_YEARS_S = (
-    3.1e8,
-    3.4e9,
-)  # seconds since 1970 in the years 1979 to 2077; later ones count from 1900 or 1904
+# seconds since 1970 in the years 1979 to 2077; later ones count from 1900 or 1904
+_YEARS_S = (3.1e8, 3.4e9)
+_DAY_NUMBERS = ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))  # of 1954 to 2119
+_RANGE = pd.Timestamp(1678, 1, 1), pd.Timestamp(2262, 1, 1)
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
-DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
+DURATION = (
+    r"[+-]?\d+(?:\.\d+)? ?"
+    r"(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
+)
 """Pattern of a time span as text, such as `0.5 sec` and `1 days 00:00:01`."""
 _ISO = "ISO8601"
+_COMPACT = {7: "%Y%j", 8: "%Y%m%d", 10: "%Y%m%d%H", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 _MIDNIGHT = r"(?<=[T ])24(?=:00)"  # at the end of a day
 LOOK = 200  # number of cells that are inspected to find a form
-_TIME = r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>\.\d+)?)?)(?P<half> ?[AaPp][Mm])?"
-_END = rf"(?:(?P<gap>[T:]|,? +){_TIME})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
+TIME_OF_DAY = (
+    r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>[.,]\d+)?)?)(?P<half> ?[AaPp][Mm])?"
+)
+_END = rf"(?:(?P<gap>[T:]|,? +){TIME_OF_DAY})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
 _DAY_OF_YEAR = re.compile(rf"\d{{4}}(?P<mark>[-/:. ]?)\d{{3}}{_END}")
-_DAY_MONTH = re.compile(rf"\d\d?(?P<mark>[./-])\d\d?(?P=mark)\d\d(?P<century>\d\d)?{_END}")
+_DAY_MONTH = re.compile(
+    r"\d\d?(?P<mark>[./-])(?:\d\d?|(?P<letters>[A-Za-z]{3}))"
+    rf"(?P=mark)\d\d(?P<century>\d\d)?{_END}"
+)
+_GUESSED = re.compile(r"[A-Za-z]{3}|^\d{4}[/.]")
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Times:
     """Parsed times."""
 
-    stamps: (
-        pd.DatetimeIndex
-    )  # NaT where missing, in UTC if the source says so and without a zone otherwise
+    # NaT where missing, in UTC if the source says so and without a zone otherwise
+    stamps: pd.DatetimeIndex
     bad: np.ndarray  # mask of the times that could not be parsed
     form: str = "dates"  # how they are written, for the report
     zone: str = ""  # that the source states, for the report; empty if it states none
     counts: bool = False  # whether they count from a zero of their own and are no dates
+
+    def at(self, rows: np.ndarray) -> "Times":
+        """The times of some rows."""
+        return dataclasses.replace(self, stamps=self.stamps[rows], bad=self.bad[rows])
 
 
 def parse_times(
@@ -76,14 +92,17 @@ def parse_times(
     Args:
         times: Date-times, text, objects, time spans, or numbers.
         what: Description of the source, for messages.
-        drop: Whether a time that cannot be parsed is marked and taken as missing, instead of refused.
+        drop: Whether a time that cannot be parsed is marked and taken as missing, instead of
+            refused.
         form: How they are written, see `Cleaning.time_format`. None: detected.
         places: Where the rows are in their file, for messages.
     """
-    times, reader = as_column(times, what), _Reader(what, drop, places)
+    times = as_column(times, what)
+    reader = _Reader(what, drop, places)
     if isinstance(times.dtype, pd.PeriodDtype):
         times = times.astype(str).where(times.notna()) if len(times) else times.astype(object)
-    kind, is_format = times.dtype, form is not None and "%" in form
+    kind = times.dtype
+    is_format = form is not None and "%" in form
     if pd.api.types.is_datetime64_any_dtype(kind):
         return reader.of_dates(times)
     if pd.api.types.is_timedelta64_dtype(kind):
@@ -94,7 +113,8 @@ def parse_times(
         or kind.kind == "c"
     ):
         raise InputError(
-            f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another time column."
+            f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another "
+            "time column."
         )
     if not is_text(times):
         if not is_format:
@@ -119,54 +139,63 @@ class _Reader:
         self,
         cells: pd.Series,
         bad: np.ndarray,
-        then: str = "Correct them or name another time column",
+        otherwise: str = "times as 2024-03-01T12:00:00",
+        expected: str = "times as ISO 8601 date-times or seconds",
     ) -> None:
-        """Raises an `InputError` that names the first bad cell, unless there is none or they are dropped."""
+        """Raises an `InputError` that names the first bad cell, unless there is none or they are
+        dropped.
+        """
         if self.drop or not bad.any():
             return
         row = int(np.argmax(bad))
         try:
             received = format_cell(cells.iloc[row])
-        except (
-            NotImplementedError,
-            OverflowError,
-            ValueError,
-        ):  # the time is too far in the future or past to be converted to its zone
+        # the time is too far in the future or past to be converted to its zone
+        except (NotImplementedError, OverflowError, ValueError):
             received = "a time out of range"
         raise InputError(
-            f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {self.places.of(row)} of {self.what} "
-            f"({int(bad.sum()):,} in all). {then}, or leave them out with drop_bad=True (--drop-bad)."
+            f"Expected {expected}. Received: {received} at {self.places.of(row)} of {self.what} "
+            f"({int(bad.sum()):,} in all).",
+            [{"drop_bad": True}] if 2 * bad.sum() < len(bad) else self.counting(),
+            otherwise,
         )
 
+    def counting(self) -> list[dict[str, str]]:
+        """The option of counting the samples, where a column of times is read."""
+        return [{"time": "none"}] if self.places.files else []
+
     def of_dates(self, times: pd.Series) -> Times:
-        stamps, zone = pd.DatetimeIndex(times), ""
+        stamps = pd.DatetimeIndex(times)
+        zone = ""
         if stamps.tz is not None:
-            zone = str(stamps.tz)
+            zone = f"{stamps.tz}, stated"
             stamps = stamps.tz_convert("UTC")
-        coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
-        bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
-        self.refuse(times, bad, "Give times from 1678 to 2261")
-        return Times(stamps.where(~bad).as_unit("ns"), bad, "dates", zone)
+        first, end = (edge.tz_localize(stamps.tz) for edge in _RANGE)
+        bad = (stamps < first) | (stamps >= end)
+        self.refuse(times, bad, "times from 1678 to 2261")
+        if bad.any():
+            stamps = stamps.where(~bad)
+        return Times(stamps.as_unit("ns"), bad, "dates", zone)
 
     def of_numbers(self, times: pd.Series, unit: str | None) -> Times:
-        values, form = times.to_numpy(np.float64, na_value=np.nan), ""
+        values = times.to_numpy(np.float64, na_value=np.nan)
+        form = ""
         finite = np.isfinite(values)
         unit = unit or _infer_unit(values[finite], self.what)
         if unit in DAYS:
-            values, form = (
-                np.round((values - DAYS[unit]) * 86_400, 3),
-                _DAY_NAMES[unit],
-            )  # a spreadsheet's eight decimals are a millisecond
-            times, unit = pd.Series(values), "s"
+            # a spreadsheet's eight decimals are a millisecond
+            values = np.round((values - DAYS[unit]) * 86_400, 3)
+            form = _DAY_NAMES[unit]
+            times = pd.Series(values)
+            unit = "s"
         factor = UNITS_NS[unit]
         bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
         self.refuse(times, bad)
         usable = finite & ~bad
         since = np.full(len(values), pd.NaT.value, np.int64)
         if pd.api.types.is_integer_dtype(times.dtype):
-            since[usable] = (
-                times[usable].to_numpy().astype(np.int64) * factor
-            )  # integers keep their precision
+            # integers keep their precision
+            since[usable] = times[usable].to_numpy().astype(np.int64) * factor
         else:
             whole = np.floor(values[usable])
             since[usable] = whole.astype(np.int64) * factor + np.round(
@@ -183,9 +212,8 @@ class _Reader:
         missing = is_missing(cells)
         given, text = (cells[~missing], cells.where(~missing)) if missing.any() else (cells, cells)
         if cells.dtype == object:
-            is_date = given.map(
-                lambda cell: isinstance(cell, datetime.date | np.datetime64)
-            )  # datetime is a subclass of date
+            # datetime is a subclass of date
+            is_date = given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64))
             if len(given) and is_date.all():
                 aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
                 return self.of_dates(
@@ -197,16 +225,19 @@ class _Reader:
                 )
             ).astype("str")
         if len(given) and not is_format:
-            head, found, unit = given.iloc[:20], None, form
+            head = given.iloc[:20]
+            found = None
+            unit = form
             if parse_numbers(head, self.what, drop=True, units=False)[1].mean() <= 0.5:
                 values, bad, _ = parse_numbers(cells, self.what, drop=True, units=False)
-                exact = pd.to_numeric(
-                    cells.where(~missing), errors="coerce"
-                )  # integer nanoseconds keep their precision
+                # integer nanoseconds keep their precision
+                exact = pd.to_numeric(cells.where(~missing), errors="coerce")
                 found = exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values)
             elif head.astype(str).str.strip().str.fullmatch(DURATION).all():
                 spans = pd.to_timedelta(text, errors="coerce")
-                found, bad, unit = spans.dt.total_seconds(), spans.isna().to_numpy() & ~missing, "s"
+                found = spans.dt.total_seconds()
+                bad = spans.isna().to_numpy() & ~missing
+                unit = "s"
             if found is not None:
                 self.refuse(cells, bad)
                 times = self.of_numbers(found, unit)
@@ -214,38 +245,49 @@ class _Reader:
         forms = [form] if is_format else date_forms(text.dropna())
         if len(forms) > 1:
             raise InputError(
-                f"Expected dates whose day, month and year can be told apart. Received: {format_cell(given.iloc[0])} in "
-                f"{self.what}. Give time_format {' or '.join(map(repr, forms))} (--time-format)."
+                "Expected dates whose day, month and year can be told apart. Received: "
+                f"{format_cell(given.iloc[0])} in {self.what}.",
+                [{"time_format": each} for each in forms],
             )
         return self._of_dates_as_text(cells, text, missing, forms[0] if forms else _ISO)
+
+    def refuse_form(self, cells: pd.Series, bad: np.ndarray) -> None:
+        """Refuses dates of an unknown form, unless bad ones are dropped."""
+        cell = str(cells.iloc[int(np.argmax(bad))]).strip()
+        if re.search(r"\d ?(?:[A-Z]{3,5}|\[[^]]*\])$", cell):
+            known = "whose zone is an offset"
+            otherwise = "the zone as an offset such as +01:00"
+        elif re.match(r"\d\d?[/.-]\d\d? ", cell):
+            known = "with a year"
+            otherwise = "dates as 2024-01-31T12:00:00"
+        else:
+            known = "of a known form"
+            otherwise = "their form with --time-format"
+        self.refuse(cells, bad, otherwise, f"dates {known}")
 
     def _of_dates_as_text(
         self, cells: pd.Series, text: pd.Series, missing: np.ndarray, form: str
     ) -> Times:
         try:
             dates, zoned = _parse_dates(text, form)
-        except (
-            ValueError,
-            TypeError,
-            KeyError,
-            IndexError,
-            OverflowError,
-            re.error,
-        ):  # an invalid format
+        # an invalid format
+        except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):
             raise InputError(
-                f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}."
+                "Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. "
+                f"Received: {form!r}."
             ) from None
         bad = dates.isna().to_numpy() & ~missing
-        then = "Give time_format (--time-format '%d.%m.%Y %H:%M:%S') or name another time column"
-        if bad.any() and re.search(r"\d ?(?:[A-Z]{3,5}|\[.*\])$", str(cells[bad].iloc[0])):
-            then = "Write the zone as an offset such as +01:00"
-        self.refuse(cells, bad, then)
+        if 2 * bad.sum() >= len(bad) > 0:
+            self.refuse_form(cells, bad)
+        self.refuse(cells, bad)
         parsed = self.of_dates(dates)
         there = parsed.stamps.notna()
-        is_zoned, bare = bool(zoned[there].any()), np.flatnonzero(there & ~zoned)
+        is_zoned = bool(zoned[there].any())
+        bare = np.flatnonzero(there & ~zoned)
         if is_zoned and len(bare):
             raise InputError(
-                f"Expected times of which all or none state a zone. Received: {format_cell(cells.iloc[bare[0]])} at {self.places.of(bare[0])} of "
+                "Expected times of which all or none state a zone. Received: "
+                f"{format_cell(cells.iloc[bare[0]])} at {self.places.of(bare[0])} of "
                 f"{self.what}, without one among others with one. Complete them."
             )
         name = "ISO 8601 dates" if form == _ISO else f"dates of the form {form}"
@@ -254,64 +296,64 @@ class _Reader:
 
 
 def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) -> None:
-    """Refuses numbers that may be seconds, or days, dates such as 20240301, decimal years, times of day such as 120059, or ms of a run.
+    """Refuses numbers that may be seconds, or days, dates such as 20240301, decimal years, times of
+    day such as 120059, or ms of a run.
 
-    Days, of the years 1954 to 2119, are told by steps of whole or tenth seconds; `is_date` says that the column's name speaks of dates.
+    Days, of the years 1954 to 2119, are told by steps of whole or tenth seconds; `is_date` says
+    that the column's name speaks of dates.
     """
     if len(values) < 2:
         return
-    low, high, is_whole, step = (
-        values.min(),
-        values.max(),
-        (values % 1 == 0).all(),
-        float(np.median(np.abs(np.diff(values)))),
-    )
-    is_of_day = (
+    low = values.min()
+    high = values.max()
+    is_whole = (values % 1 == 0).all()
+    step = float(np.median(np.abs(np.diff(values))))
+    found: dict[str, Sequence[str]] = {}  # the formats that a meaning has
+    if 1900 <= low and high < 2100:
+        found["decimal years"] = ()
+    minutes = values // 100 % 100
+    if (
         1e4 <= low
         and high < 24e4
         and low // 100 < high // 100
-        and max((values % 100).max(), (values // 100 % 100).max()) < 60
-    )
-    is_fine = is_whole and 0 < low < 1.2e9 and step >= 1_000 and step % 60 > 0
-    kinds = {
-        "decimal years": 1900 <= low and high < 2100,
-        "hhmmss": is_of_day,
-        "ms or us (time_format 'ms' or 'us')": is_fine,
-    }
-    for digits, form in (
-        (7, "%Y%j"),
-        (8, "%Y%m%d"),
-        (10, "%Y%m%d%H"),
-        (12, "%Y%m%d%H%M"),
-        (14, "%Y%m%d%H%M%S"),
+        and max((values % 100).max(), minutes.max()) < 60
     ):
-        if is_whole and 1.9 * 10 ** (digits - 1) <= low and high < 2.2 * 10 ** (digits - 1):
-            text = pd.Series(values[:1_000].astype(np.int64).astype(str))
-            kinds[f"dates (time_format {form!r})"] = (
-                pd.to_datetime(text, format=form, errors="coerce").notna().all()
-            )
+        found["times of day"] = ()
+    if is_whole and 0 < low < 1.2e9 and step >= 1_000 and step % 60 > 0:
+        found["ms or us"] = ("ms", "us")
+    if form := compact_form(values):
+        found["dates"] = (form,)
     tenths = step * 864_000
     is_odd = (
         abs(step * 1000 - round(step * 1000)) > 1e-6
         and round(tenths) > 0
         and abs(tenths - round(tenths)) < 0.01 * tenths
     )
-    if any(
-        first <= low and high < last
-        for first, last in ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))
-    ):
+    if (is_odd or is_date) and any(first <= low and high < last for first, last in _DAY_NUMBERS):
         since = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
-        dates = [
-            f"{kind} (from {pd.Timestamp(round(s), unit='s')})"
-            for kind, s in since.items()
-            if _YEARS_S[0] < s < _YEARS_S[1]
-        ]
-        kinds[f"days (time_format {', '.join(dates) or 'D'})"] = is_odd or is_date
-    if kind := next((kind for kind, found in kinds.items() if found), None):
+        days = [kind for kind, s in since.items() if _YEARS_S[0] < s < _YEARS_S[1]]
+        begins = [f"{kind} from {pd.Timestamp(round(since[kind]), unit='s')}" for kind in days]
+        found[f"days ({', '.join(begins)})"] = days or ["D"]
+    for meaning, formats in found.items():
         raise InputError(
-            f"Expected times whose unit is known. Received: {values[0]:.15g} to {values[-1]:.15g} in {what}, which may be {kind} "
-            "or seconds (time_format 's'). Give time_format (--time-format), or write the times as dates."
+            f"Expected times whose unit is known. Received: {values[0]:.15g} to {values[-1]:.15g} "
+            f"in {what}, which may be {meaning} or seconds.",
+            [{"time_format": form} for form in (*formats, "s")],
+            "the times as dates",
         )
+
+
+def compact_form(values: np.ndarray) -> str | None:
+    """Returns the format of dates that are written as numbers, such as 20240301, or None."""
+    if not len(values) or not (values % 1 == 0).all():
+        return None
+    text = pd.Series(values[:1_000].astype(np.int64).astype(str))
+    for digits, form in _COMPACT.items():
+        size = values / 10 ** (digits - 1)
+        if ((1.9 <= size) & (size < 2.2)).all():
+            is_date = pd.to_datetime(text, format=form, errors="coerce").notna().all()
+            return form if is_date else None
+    return None
 
 
 def _infer_unit(values: np.ndarray, what: str) -> str:
@@ -321,102 +363,101 @@ def _infer_unit(values: np.ndarray, what: str) -> str:
     if unit is not None:
         return unit
     raise InputError(
-        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in {what}, which are not from 1980 to 2077 in any of "
-        "these units. Give time_format, such as 'ms' (--time-format)."
+        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in "
+        f"{what}, which are not from 1980 to 2077 in any of these units.",
+        [{"time_format": form} for form in ("ms", "us", "ns", "s")],
     )
 
 
 def epoch_unit(size: float) -> str | None:
-    """Returns the unit in which a number is a time since 1970 from the years 1979 to 2077, or None."""
-    units = ("s", "ms", "us", "ns")[
-        : 3 if 6.3e17 < size < 6.5e17 else 4
-    ]  # not .NET's steps of 100 ns since the year 1
+    """Returns the unit in which a number is a time since 1970 from the years 1979 to 2077, or
+    None.
+    """
+    # not .NET's steps of 100 ns since the year 1
+    units = ("s", "ms", "us", "ns")[: 3 if 6.3e17 < size < 6.5e17 else 4]
     return next(
         (unit for unit in units if _YEARS_S[0] <= size * UNITS_NS[unit] / 1e9 <= _YEARS_S[1]), None
     )
 
 
 def date_forms(text: pd.Series) -> list[str]:
-    """Finds the forms in which text without missing cells may hold dates: formats as for `datetime.strptime`, or `_ISO`.
+    """Finds the forms in which text without missing cells may hold dates: formats as for
+    `datetime.strptime`, or `_ISO`.
 
     None: the text is no dates. Two: day and month cannot be told apart.
     """
     head = _plain(text.iloc[:LOOK])
-    if not len(head):
-        return []
-    if (
-        not head.str.fullmatch(r"\d{1,7}").all()
-        and pd.to_datetime(head, format=_ISO, utc=True, errors="coerce").notna().mean() > 0.5
-    ):
+    is_number = head.str.fullmatch(r"\d{1,7}").all()
+    dates = pd.to_datetime(head, format=_ISO, utc=True, errors="coerce")
+    if not is_number and dates.notna().mean() > 0.5:
         return [_ISO]
     for cell in head.iloc[:3]:  # the first cells may be damaged
         if found := _DAY_OF_YEAR.fullmatch(cell):
             return [f"%Y{found['mark']}%j{_end(found)}"] if found["mark"] or found["time"] else []
         if found := _DAY_MONTH.fullmatch(cell):
-            year, mark = "Y" if found["century"] else "y", found["mark"]
-            return [order.replace("-", mark) + _end(found) for order in _orders(text, mark, year)]
-        if (
-            re.search(r"[A-Za-z]{3}|^\d{4}[/.]", cell)
-            and (form := guess_datetime_format(cell))
-            and "%Y" in form
-            and "%d" in form
-        ):
+            mark = found["mark"]
+            year = "%Y" if found["century"] else "%y"
+            orders = [f"%d{mark}%b{mark}{year}"] if found["letters"] else _orders(text, mark, year)
+            return [form + _end(found) for form in orders]
+        form = guess_datetime_format(cell) if _GUESSED.search(cell) else None
+        if form and "%Y" in form and "%d" in form:
             return [form]
-        if found := re.fullmatch(
-            rf"\d\d?(?P<mark>[/-])[A-Za-z]{{3}}(?P=mark)\d\d(?P<century>\d\d)?{_END}", cell
-        ):
-            return [
-                f"%d-%b-%{'Y' if found['century'] else 'y'}".replace("-", found["mark"])
-                + _end(found)
-            ]
     return []
 
 
 def _orders(text: pd.Series, mark: str, year: str) -> list[str]:
-    """Returns the orders of day, month and year that all dates allow; with points, the day comes first."""
+    """Returns the orders of day, month and year that all dates allow; with points, the day comes
+    first.
+    """
     days = pd.Series(text.str[:12].unique(), dtype="str")  # far fewer than rows
-    largest = (
-        days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}(\d\d)").dropna().astype(int).max()
-    )
-    orders = [f"%d-%m-%{year}", f"%m-%d-%{year}", *(["%y-%m-%d"] if year == "y" else [])]
+    parts = days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}(\d\d)").dropna().astype(int)
+    orders = [("%d", "%m", year), ("%m", "%d", year), ("%y", "%m", "%d")]
     most = {"%m": 12, "%d": 31}
-    orders = [
-        order
-        for order in orders
-        if all(
-            part <= most.get(kind, 99) for part, kind in zip(largest, order.split("-"), strict=True)
-        )
+    possible = [
+        mark.join(order)
+        for order in orders[: 3 if year == "%y" else 2]
+        if all(parts[place].max() <= most.get(kind, 99) for place, kind in enumerate(order))
     ]
-    return orders[:1] if mark == "." else orders
+    return possible[:1] if mark == "." else possible
 
 
 def _end(found: re.Match) -> str:
     """Returns the format of the time of day and the zone behind a date."""
     if not found["time"]:
         return ""
-    hours = "%I:%M" if found["half"] else "%H:%M"
-    time = hours + (":%S" if found["seconds"] else "") + (".%f" if found["fraction"] else "")
-    half = "" if not found["half"] else found["half"][:-2] + "%p"
-    return (
-        found["gap"]
-        + time
-        + half
-        + ("" if not found["zone"] else found["zone"][: found["zone"].startswith(" ")] + "%z")
-    )
+    form = "%I:%M" if found["half"] else "%H:%M"
+    form += ":%S" if found["seconds"] else ""
+    form += ".%f" if found["fraction"] else ""
+    form += found["half"][:-2] + "%p" if found["half"] else ""
+    zone = found["zone"] or ""
+    return found["gap"] + form + zone[: zone.startswith(" ")] + ("%z" if zone else "")
 
 
 def _plain(text: pd.Series) -> pd.Series:
-    """Rewrites what no parser takes: decimal commas in seconds, and UTC in words."""
+    """Rewrites what no parser takes: decimal commas in seconds, UTC in words, and intervals, of
+    which the start is kept.
+    """
     return (
         text.str.strip()
+        .str.replace(r"^(\d{4}-\d\d-\d\dT[^/]*)/.*", r"\1", regex=True)
         .str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True)
         .str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
+        .str.replace(r"([AaPp])\. ?[Mm]\.?$", r"\1M", regex=True)
     )
 
 
 def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
-    """Parses dates of one form; returns them in UTC, and which cells state a zone: by an offset behind a time of day, or by the format."""
-    dates = pd.to_datetime(text, format=form, utc=True, errors="coerce").dt.tz_localize(None)
+    """Parses dates of one form; returns them in UTC, and which cells state a zone: by an offset
+    behind a time of day, or by the format.
+    """
+    try:
+        dates = pd.to_datetime(text, format=form, errors="coerce")
+        is_mixed = False
+    except ValueError:  # several offsets, or none in some cells
+        dates = pd.to_datetime(text, format=form, utc=True, errors="coerce")
+        is_mixed = True
+    is_zoned = dates.dt.tz is not None
+    dates = dates.dt.tz_convert(None) if is_zoned else dates
     left = (dates.isna() & text.notna()).to_numpy()
     if left.any():
         rest = _plain(text[left].astype(str))
@@ -428,12 +469,13 @@ def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
                 pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None)
                 + late
             )
-            unit = np.promote_types(
-                dates.dtype, found.dtype
-            )  # whole seconds and fractions have different units
+            # whole seconds and fractions have different units
+            unit = np.promote_types(dates.dtype, found.dtype)
             dates = dates.astype(unit).fillna(found.astype(unit))
     if form != _ISO:
         return dates, np.full(len(text), "%z" in form or "%Z" in form)
+    if not is_mixed and not left.any():
+        return dates, np.full(len(text), is_zoned)
     zone = r"[T ]\d\d(?::?\d\d(?::?\d\d(?:[.,]\d+)?)?)?\s?(?:Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)\s*$"
     return dates, text.str.contains(zone).fillna(False).to_numpy(bool)
 
@@ -441,14 +483,15 @@ def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
 def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     """Assigns a time zone to times without one; raises an `InputError` if it is unknown.
 
-    Of an hour that a clock repeats in autumn, the order of the rows shows which is meant; where it does not, times become NaT. So do
-    local times that do not exist.
+    Of an hour that a clock repeats in autumn, the order of the rows shows which is meant; where it
+    does not, times become NaT. So do local times that do not exist.
     """
     try:
         local = stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
-    except (KeyError, ValueError, TypeError, OSError):
+    except (KeyError, IndexError, ValueError, TypeError, OSError):  # IndexError: an empty name
         raise InputError(
-            f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another."
+            f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name "
+            "another."
         ) from None
     known = np.flatnonzero(stamps.notna())
     order = -1 if len(known) > 1 and stamps[known[0]] > stamps[known[-1]] else 1
@@ -463,35 +506,74 @@ def refuse_steps_back(
 ) -> None:
     """Refuses times that step back where sorting would mix what happened at different times.
 
-    These are times that count from zero and begin again, as after a restart, and, unless a zone is given or stated, dates that step back by about
-    one hour only, as a local clock does, or by a day to where there were none, as where the date of the first day stays past midnight.
-    `times` are nanoseconds in the order of the source, and `rows` their rows there.
+    These are times that count from zero and begin again, as after a restart, and, unless a zone is
+    given or stated, dates that step back by about one hour only, as a local clock does, by a day to
+    where there were none, as where the date of the first day stays past midnight, or over times
+    that they have shown before. `times` are nanoseconds in the order of the source, and `rows`
+    their rows there.
     """
-    steps, hour = np.diff(times), UNITS_NS["h"]
-    usual = np.median(np.abs(steps)) if len(steps) else 0
+    steps = np.diff(times)
+    if (steps > 0).all():
+        return
+    hour = UNITS_NS["h"]
+    counting = [{"time": "none"}]
+    options = [{"timezone": "UTC"}]
+    otherwise = "the zone of the clock, as Europe/Berlin"
+    usual = np.median(np.abs(steps))
     back = np.flatnonzero(steps < 0)
-    if log.counts:  # a single late row is followed by as long a step forward
-        late = 10 * usual
+
+    def are(step: int) -> bool:
+        return len(back) > 0 and bool((np.abs(steps[back] + step) <= 2 * usual).all())
+
+    if log.counts:
+        late = 10 * usual  # a single late row is followed by as long a step forward
         back = np.flatnonzero(
             (steps[:-1] < -late)
             & (np.abs(steps[1:]) <= late)
             & (times[1:-1] <= np.minimum.accumulate(times)[:-2] + late)
         )
         how = "count from zero and begin again, as after a restart"
-        then = "Read the parts one by one, or give time 'none' (--time none) to count the samples"
-    elif has_zone or usual >= hour / 2:
+        options = counting
+        otherwise = "the parts one by one"
+    elif has_zone:
         return
-    elif (np.abs(steps[back] + hour) <= 2 * usual).all():
+    elif usual >= hour / 2:  # a late row is no step back by an hour only on a Sunday morning
+        back = np.flatnonzero(np.abs(steps + hour - usual) <= 0.01 * usual)
+        stamps = pd.DatetimeIndex(times[back])
+        is_change = (stamps.day_of_week == 6) & (stamps.hour <= 3) & (usual <= hour)
+        back = back[is_change][:1]
+        how = "state no zone and repeat an hour, as local clocks do"
+    elif are(hour):
         how = "state no zone and step back by one hour, as local clocks do"
-        then = "Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)"
-    elif (np.abs(steps[back] + UNITS_NS["D"]) <= 2 * usual).all() and len(np.unique(times)) == len(
-        times
-    ):
+    elif are(UNITS_NS["D"]) and len(np.unique(times)) == len(times):
         how = "state no zone and step back by one day, as where a date stays past midnight"
-        then = "Correct them, or give timezone (--timezone UTC, or another) to sort them"
+        options += counting
+        otherwise = ""
     else:
-        return
+        back = jumps_back(times)
+        how = "go back and cover the same time once more, as where a clock was set"
+        options = counting
+        otherwise = "the parts one by one"
     if len(back):
         raise InputError(
-            f"Expected ascending times. Received: times that {how}, at {log.place(rows[back[0] + 1])} of {name}. {then}."
+            f"Expected ascending times. Received: times that {how}, at "
+            f"{log.place(rows[back[0] + 1])} of {name}.",
+            options,
+            otherwise,
         )
+
+
+def jumps_back(times: np.ndarray) -> list[int]:
+    """Returns the rows, at most three, after which a clock goes back by far and runs on over times
+    that it has shown before. `times` are nanoseconds in the order of the source.
+    """
+    steps = np.diff(times)
+    jumps = np.flatnonzero(steps < -10 * np.median(np.abs(steps))) if len(steps) else steps
+    if not 1 <= len(jumps) <= 3:
+        return []
+    for begin, end in itertools.pairwise([*(jumps + 1), len(times)]):
+        run = times[begin:end]
+        again = (times[:begin] >= run.min()) & (times[:begin] <= run.max())
+        if again.sum() <= 10 or len(run) <= 10 or (np.diff(run) >= 0).mean() <= 0.9:
+            return []
+    return jumps.tolist()

@@ -1,7 +1,10 @@
-"""Reads the channels of a table, each with its times and with findings that say what was decided."""
+"""Reads the channels of a table, each with its times and with findings that say what was
+decided.
+"""
 
 import dataclasses
 import itertools
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,9 +13,11 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.read_errors import MAX_COLUMNS
-from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_text
+from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_missing, is_text
 from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
+from enhsim_tf.telemetry.cleaning.times import jumps_back
 from enhsim_tf.telemetry.reading.clock import NO_TIME, words_of
 from enhsim_tf.telemetry.reading.columns import Layout, anomalous, lay_out
 from enhsim_tf.telemetry.reading.files import read_table
@@ -26,46 +31,36 @@ _SAID = {
     "columns left out": "columns without numbers",
 }
 _KEYS = set(
-    "host hostname sensor sensorid device deviceid node tag tagname channel channelname parameter param signal variable metric field series "
-    "measurement point pointname station machine asset entity source location site name id copy table result item object unit".split()
+    "host hostname sensor sensorid device deviceid node tag tagname channel channelname parameter "
+    "param signal variable metric field series measurement point pointname station machine asset "
+    "entity source location site name id copy table result item object unit".split()
 )
-_FIRST = (
-    "_field",
-    "field",
-    "series",
-    "metric",
-    "parameter",
-    "signal",
-    "variable",
-    "sensor",
-    "channel",
-    "tag",
-)
+_FIRST = "_field field series metric parameter signal variable sensor channel tag".split()
+_OFF = set("off false no closed inactive low disabled disarmed stopped down idle 0 n".split())
+_PAIR = re.compile(r"[A-Za-z]\w* ?[:=] ?[+-]?\d")  # a name and its value in one cell
+_MAX_STATES = 10  # words of a column that are read as states
 _MAX_SERIES = 500  # values of a column that tells series apart unasked
 _OFTEN = 0.3  # share of the rows whose time repeats, above which a table may hold several series
 
 
-class Channels(dict[str, pd.Series]):
+class Channels(dict[str, RawChannel]):
     """Raw channels by name, with what their source holds beside them.
 
     Args:
         channels: The channels.
-        table: The whole table that the channels are columns of; None if they are from another source.
-        commands: Commands of the samples of an array, float32 of shape `(samples, commands)`, or None.
+        table: The whole table that the channels are columns of; None if they are from another
+            source.
     """
 
-    def __init__(
-        self,
-        channels: Mapping[str, pd.Series],
-        table: pd.DataFrame | None = None,
-        commands: np.ndarray | None = None,
-    ):
+    def __init__(self, channels: Mapping[str, RawChannel], table: pd.DataFrame | None = None):
         super().__init__(channels)
-        self.table, self.commands = table, commands
+        self.table = table
 
     def rows_of(self, name: str) -> pd.DataFrame | None:
-        """The rows of the table that hold a channel: all of them, unless the table holds several series. None if there is no table."""
-        rows = None if self.table is None else self[name].attrs["places"].rows
+        """The rows of the table that hold a channel: all of them, unless the table holds several
+        series. None if there is no table.
+        """
+        rows = None if self.table is None else self[name].places.rows
         return self.table if rows is None else self.table.iloc[rows]
 
 
@@ -79,24 +74,42 @@ def read_table_channels(
     what = "the table"
     if not isinstance(source, pd.DataFrame | pd.Series):
         what = source.name if isinstance(source, Path) else f"{source[0].name} ..."
-    table = _without_repeats(read_table(source, options), columns, time, options, what)
+    table = read_table(source, options)
+    given = table.frame.columns
+    table = _with_different_names(table, columns, time, options, what)
+    # others are names of series
     named = (
         list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None
-    )  # others are names of series
+    )
     layout = lay_out(table, named, time, options, what)
+    if columns is None and (several := [name for name in layout.channels if name not in given]):
+        raise InputError(
+            f"Expected channels of different names. Received: {', '.join(several[:8])} in {what}, "
+            "numbered here.",
+            [{"columns": several}, *({"columns": [name]} for name in several[:4])],
+        )
     keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]
     findings = list(table.findings)
     for kind, text in _SAID.items():
-        if names := [name for name in layout.left_out.get(kind, ()) if name not in keys]:
+        used = (*keys, *(layout.words if options.states else ()))
+        if names := [name for name in layout.left_out.get(kind, ()) if name not in used]:
             findings.append(Finding(kind, len(names), f"{text}: {', '.join(names[:8])}"))
     if not keys:
         _refuse_parallel_files(table.places, layout, what)
         chosen = {name: (name, None) for name in layout.channels}
+        if options.states:
+            table, states, noted = _with_states(table, layout, named)
+            chosen = {name: place for name, place in chosen.items() if name not in layout.words}
+            chosen |= {name: (name, None) for name in states}
+            findings += noted
     else:
         chosen = _name_series(
             table.frame, keys, [name for name in layout.channels if name not in keys], what
         )
-        text = f"series told apart by {', '.join(keys)}: {len(chosen):,} ({', '.join(list(chosen)[:6])})"
+        text = (
+            f"series told apart by {', '.join(keys)}: {len(chosen):,} "
+            f"({', '.join(list(chosen)[:6])})"
+        )
         findings.append(Finding("series", len(chosen), text))
     if columns is not None and named is None:
         unknown = next((name for name in columns if name not in chosen), None)
@@ -113,8 +126,12 @@ def read_table_channels(
         left = "".join(f"; {finding.text}" for finding in findings if finding.kind == "files") + (
             f"; left out: {left}" if left else ""
         )
+        has_states = any(_is_state(table.frame[name]) for name in layout.words)
+        pairs = "only numbers below a line of names, with commas between them"
         raise InputError(
-            f"Expected a column of numbers. Received: none in {what} beside the times{left}. Give another table, or name the columns."
+            f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
+            [{"states": True}] if has_states else (),
+            pairs if _PAIR.search(left) else "another table",
         )
     channels = {
         name: _channel(table, layout, name, *place, findings, options)
@@ -123,22 +140,50 @@ def read_table_channels(
     return Channels(channels, table.frame)
 
 
+def _is_state(cells: pd.Series) -> bool:
+    """Whether a column of words has from two to ten."""
+    return 2 <= cells.nunique() <= _MAX_STATES
+
+
+def _with_states(
+    table: Table, layout: Layout, named: Sequence[str] | None
+) -> tuple[Table, list[str], list[Finding]]:
+    """Adds columns of 0 and 1 for columns of words: one for two words, otherwise one for each."""
+    frame = table.frame.copy(deep=False)
+    names = []
+    findings = []
+    for name in layout.words if named is None else [name for name in named if name in layout.words]:
+        cells = frame[name].astype("str").str.strip()
+        cells = cells.mask(is_missing(frame[name].astype(object)))
+        words = sorted(
+            cells.dropna().unique(), key=lambda word: (word.casefold() not in _OFF, word)
+        )
+        if not _is_state(cells):
+            continue
+        made = {name: words[1]} if len(words) == 2 else {f"{name}={word}": word for word in words}
+        for channel, word in made.items():
+            frame[channel] = (cells == word).astype(np.float64).mask(cells.isna())
+        names += made
+        said = f"{words[0]} is 0, {words[1]} is 1" if len(words) == 2 else ", ".join(made)
+        findings.append(Finding("states", len(made), f"words of {name!r} read as 0 and 1: {said}"))
+    return dataclasses.replace(table, frame=frame), names, findings
+
+
 def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
     """Refuses files over the same times, which are no parts of one series."""
-    if len({name for _, _, name in places}) < 2 or layout.times is None:
+    if len({name for _, _, name in places.files}) < 2 or layout.times is None:
         return
-    starts = [row for row, _, _ in places]
     stamps = pd.Series(layout.times.stamps)
-    spans = (
-        stamps.groupby(np.searchsorted(starts, np.arange(len(stamps)), "right") - 1)
-        .agg(["min", "max"])
-        .dropna()
-    )
-    for one, other in itertools.pairwise(spans.sort_values(["min", "max"]).itertuples()):
-        if min(one.max, other.max) - other.min > min(one.max - one.min, other.max - other.min) / 2:
-            first, second = places[one.Index][2], places[other.Index][2]
+    starts = [row for row, _, _ in places.files]
+    file = np.searchsorted(starts, stamps.index, "right") - 1
+    spans = stamps.groupby(file).agg(["min", "max"]).dropna().sort_values(["min", "max"])
+    for one, other in itertools.pairwise(spans.itertuples()):
+        shorter = min(one.max - one.min, other.max - other.min)
+        if min(one.max, other.max) - other.min > shorter / 2:
+            first, second = (places.files[span.Index][2] for span in (one, other))
             raise InputError(
-                f"Expected files whose times follow each other. Received: {first} and {second} over the same times, in {what}. Give them one by one."
+                f"Expected files whose times follow each other. Received: {first} and {second} "
+                f"over the same times, in {what}. Give them one by one."
             )
 
 
@@ -148,29 +193,28 @@ def _with_cell(cells: pd.Series) -> str:
     return f"{cells.name} ({format_cell(given.iloc[0])})" if len(given) else str(cells.name)
 
 
-def _without_repeats(
+def _with_different_names(
     table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str
 ) -> Table:
-    """Refuses names that occur twice, unless other columns were asked for, and names of options that do not occur."""
-    names = table.frame.columns
-    repeated = set(names[names.duplicated()])
+    """Numbers names that repeat, as `volts.1` and `volts.2`; refuses names of options that do not
+    occur.
+    """
+    given = table.frame.columns
+    repeated = given[given.duplicated()].unique()
+    counts = pd.Series(given).groupby(list(given), sort=False).cumcount() + 1
+    names = [
+        f"{name}.{number}" if name in repeated else name
+        for name, number in zip(given, counts, strict=True)
+    ]
     times = () if time is None else (time,)
-    named = [*(options.label_column or ()), *(options.series_column or ()), *times]
-    for name in [*(columns or ()), *named]:
-        if name in repeated or name in named and name not in names and name != NO_TIME:
-            received = f"{name!r} more than once in {what}" if name in repeated else repr(name)
+    asked = [name for name in columns or () if name in repeated]
+    for name in [*asked, *(options.label_column or ()), *(options.series_column or ()), *times]:
+        if name not in names and name != NO_TIME:
             raise InputError(
-                f"Expected a column of {what}: {', '.join(dict.fromkeys(names[:8]))}. Received: {received}. Name one of these."
+                f"Expected a column of {what}: {', '.join(names[:8])}. Received: {name!r}. Name "
+                "one of these."
             )
-    if columns is None and repeated:
-        raise InputError(
-            f"Expected columns of different names. Received: {min(repeated)!r} more than once in {what}. Rename them."
-        )
-    return (
-        dataclasses.replace(table, frame=table.frame.loc[:, ~names.isin(repeated)])
-        if repeated
-        else table
-    )
+    return dataclasses.replace(table, frame=table.frame.set_axis(names, axis=1))
 
 
 def _channel(
@@ -181,54 +225,40 @@ def _channel(
     rows: np.ndarray | None,
     findings: Sequence[Finding],
     options: Cleaning,
-) -> pd.Series:
-    """Makes the raw series of one channel."""
-    places, times, findings = table.places, layout.times, list(findings)
-    frame = table.frame if rows is None else table.frame[[column, *layout.labels]].iloc[rows]
-    index: pd.Index = pd.RangeIndex(len(frame))
-    attrs: dict = {"places": places if rows is None else Places(places, rows)}
-    if table.decimal is not None:
-        attrs["decimal"] = table.decimal
-    if times is not None:
-        index = (times.stamps if rows is None else times.stamps[rows]).rename(
-            layout.clock.columns[0]
-        )
-        columns = " and ".join(map(repr, layout.clock.columns))
-        attrs["clock"] = {
-            "column": columns,
-            "form": times.form,
-            "zone": times.zone,
-            "counts": times.counts,
-        }
-        if len(bad := np.flatnonzero(times.bad)):
-            where = tuple(places.of(row) for row in bad[:3])
-            findings.append(
-                Finding(
-                    "bad times",
-                    len(bad),
-                    f"times that cannot be read, taken as missing: {len(bad):,}",
-                    where,
-                )
-            )
-    series = pd.Series(frame[column].array, index=index, name=name, copy=False)
+) -> RawChannel:
+    """Makes one raw channel."""
+    places = table.places
+    times = layout.times
+    findings = list(findings)
+    frame = table.frame
+    if rows is not None:
+        frame = frame[[column, *layout.labels]].iloc[rows]
+        places = Places(places.files, rows)
+        times = None if times is None else times.at(rows)
+    cells = frame[column].reset_index(drop=True)
     for label in (label for label in layout.labels if _concerns(label, column, layout)):
         mask = anomalous(frame[label])
         if mask is None:
             said = ", ".join(map(str, frame[label].dropna().unique()[:4]))
-            text = f"labels of {label!r}, not used, because its values do not say which is anomalous: {said}"
+            text = (
+                f"labels of {label!r}, not used, because its values do not say which is anomalous: "
+                f"{said}"
+            )
             findings.append(Finding("labels", 1, text))
             continue
         how = "kept" if options.labelled == "keep" else "taken as missing"
         text = f"rows that {label!r} labels anomalous, {how}: {mask.sum():,} of {len(mask):,}"
         findings.append(Finding("labels", max(1, int(mask.sum())), text))
         if options.labelled == "missing":
-            series = series.mask(mask) if not is_text(series) else series.astype(object).mask(mask)
-    series.attrs = attrs | {"findings": [dataclasses.asdict(finding) for finding in findings]}
-    return series
+            cells = cells.mask(mask) if not is_text(cells) else cells.astype(object).mask(mask)
+    clock = " and ".join(map(repr, layout.clock.columns))
+    return RawChannel(name, cells, times, clock, 0, places, table.decimal, tuple(findings))
 
 
 def _concerns(label: str, column: str, layout: Layout) -> bool:
-    """Whether a label concerns a channel: one that ends with the name of a channel concerns that channel alone."""
+    """Whether a label concerns a channel: one that ends with the name of a channel concerns that
+    channel alone.
+    """
     owner = [
         name for name in layout.channels if label != name and label.endswith(name) and len(name) > 1
     ]
@@ -239,26 +269,20 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
     """Returns the columns whose values tell several series apart; none if the table holds one."""
     if options.series_column is not None:
         return [] if options.series_column == (NO_TIME,) else list(options.series_column)
-    own = [
-        name
-        for name in ("copy", "table")
-        if name in (*layout.channels, *layout.left_out.get("row numbers", ()))
-    ]
+    known = (*layout.channels, *layout.left_out.get("row numbers", ()))
+    own = [name for name in ("copy", "table") if name in known]
     candidates = [
         name
         for name in (*layout.words, *own)
         if 1 < frame[name].nunique(dropna=False) <= _MAX_SERIES
     ]
-    candidates.sort(
-        key=lambda name: next(
-            (rank for rank, word in enumerate(_FIRST) if word == name.casefold()), len(_FIRST)
-        )
-    )
-    candidates.sort(key=lambda name: name in own)
+    ranks = {name: rank for rank, name in enumerate(_FIRST)}
+    candidates.sort(key=lambda name: (name in own, ranks.get(name.casefold(), len(ranks))))
     times = None if layout.times is None else layout.times.stamps.as_unit("ns").asi8
+    asks = bool(layout.channels) and not options.states
     chosen: list[str] = []
     for name in candidates:
-        if _is_key(frame, name, chosen, times, what if layout.channels else None):
+        if _is_key(frame, name, chosen, times, what if asks else None):
             chosen.append(name)
     if not chosen and "_field" in frame and "_value" in layout.channels:
         return ["_field"]
@@ -274,7 +298,9 @@ def _is_key(
     times: np.ndarray | None,
     what: str | None,
 ) -> bool:
-    """Whether a column tells more series apart than the columns that were chosen before it; `what` describes the source if it may ask."""
+    """Whether a column tells more series apart than the columns that were chosen before it; `what`
+    describes the source if it may ask.
+    """
     codes = _codes(frame, [*chosen, name])
     if chosen and codes.max() == _codes(frame, chosen).max():
         return False
@@ -288,28 +314,23 @@ def _is_key(
     if _is_named(name) and name != "result" and np.bincount(codes).min() > 2:
         return True
     known = times != pd.NaT.value
-    changes = np.diff(codes[known]) != 0
-    back = (np.diff(times[known]) < 0) & changes
-    number = codes.max() + 1
-    stacked = (
-        number > 1
-        and back.sum() >= (number - 1) / 2
-        and changes.sum() < 2 * number
-        and _overlap(times[known], codes[known])
-    )
+    times = times[known]
+    codes = codes[known]
+    spans = pd.Series(times).groupby(codes).agg(np.ptp)
+    # every series covers at least half of the whole time
+    overlap = (spans >= 0.5 * np.ptp(times)).all()
+    changes = np.diff(codes) != 0
+    back = (np.diff(times) < 0) & changes
+    if overlap and back.sum() >= max(1, codes.max()) / 2 and changes.sum() < 2 * (codes.max() + 1):
+        return True
     is_word = not frame[name].dropna().astype("str").str.match(r"\s*[+-]?\d").any()
-    if (
-        what is not None
-        and is_word
-        and not stacked
-        and changes.mean() > 0.5
-        and _overlap(times[known], codes[known])
-    ):
+    if what is not None and is_word and changes.mean() > 0.5 and overlap:
         raise InputError(
-            f"Expected one series, or to know what tells several apart. Received: words that change from row to row in {name!r} of {what}. Give "
-            f"series_column (--series-column {name}, or --series-column none if all rows are of one series)."
+            "Expected one series, or to know what tells several apart. Received: words that "
+            f"change from row to row in {name!r} of {what}.",
+            [{"series_column": name}, {"series_column": NO_TIME}],
         )
-    return bool(stacked)
+    return False
 
 
 def _is_named(name: str) -> bool:
@@ -324,62 +345,63 @@ def _codes(frame: pd.DataFrame, columns: Sequence[str]) -> np.ndarray:
 
 def _repeating(frame: pd.DataFrame, keys: Sequence[str], times: np.ndarray) -> float:
     """Share of the rows whose time occurred before in the same series."""
+    if (np.diff(times) > 0).all():
+        return 0.0
     rows = frame[list(keys)].assign(**{"the time": times})[times != pd.NaT.value]
     return float(rows.duplicated().mean()) if len(rows) else 0.0
 
 
-def _overlap(times: np.ndarray, codes: np.ndarray) -> bool:
-    """Whether every series covers at least half of the whole time."""
-    spans = pd.Series(times).groupby(codes).agg(["min", "max"])
-    return bool(((spans["max"] - spans["min"]) >= 0.5 * np.ptp(times)).all())
-
-
 def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, what: str) -> None:
-    """Refuses a table in which numbers, such as those of sensors, tell series apart, because a channel may look alike."""
+    """Refuses a table in which numbers, such as those of sensors, tell series apart, because a
+    channel may look alike.
+    """
     if _repeating(frame, [], times) <= _OFTEN:
         return
-    for name, cells in frame.items():
-        is_number = (
-            pd.api.types.is_integer_dtype(cells.dtype)
-            and name not in layout.clock.columns
-            and layout.channels != (name,)
-        )
+    if jumps_back(times[times != pd.NaT.value]):
+        return  # which is said when the channels are cleaned
+    for name in frame.columns.difference([*layout.clock.columns], sort=False):
+        cells = frame[name]
         if (
-            is_number
+            pd.api.types.is_integer_dtype(cells.dtype)
+            and layout.channels != (name,)
             and 1 < cells.nunique() <= _MAX_SERIES
             and _repeating(frame, [name], times) < 0.02
         ):
             raise InputError(
-                f"Expected one row for each time. Received: times that repeat, with different values of {name!r}, in {what}. Give "
-                f"series_column (--series-column {name}) if it tells several series apart."
+                "Expected one row for each time. Received: times that repeat, with different "
+                f"values of {name!r}, in {what}.",
+                [{"series_column": name}],
+                "an interval with --interval to take their mean",
             )
 
 
 def _name_series(
     frame: pd.DataFrame, keys: Sequence[str], channels: Sequence[str], what: str
 ) -> dict[str, tuple[str, np.ndarray]]:
-    """Returns the column and the rows of each series by its name: the values of the keys, and the column if there are several."""
+    """Returns the column and the rows of each series by its name: the values of the keys, and the
+    column if there are several.
+    """
     codes = _codes(frame, keys)
     if (codes.max(initial=-1) + 1) * len(channels) > MAX_COLUMNS:
         raise InputError(
-            f"Expected at most {MAX_COLUMNS:,} series. Received: {codes.max() + 1:,} values of {', '.join(keys)} in {what}. Give another series_column."
+            f"Expected at most {MAX_COLUMNS:,} series. Received: {codes.max() + 1:,} values of "
+            f"{', '.join(keys)} in {what}. Give another series_column."
         )
-    filled = np.flatnonzero(
-        frame.notna().any(axis=1)
-    )  # a blank line, as databases write at the end, is of no series
+    # a blank line, as databases write at the end, is of no series
+    filled = np.flatnonzero(frame.notna().any(axis=1))
     order = filled[np.argsort(codes[filled], kind="stable")]
     found = {}
     for inside in np.split(order, np.flatnonzero(np.diff(codes[order])) + 1):
-        first = {key: str(frame[key].iloc[inside[0]]) for key in keys}
         words = [
             f"{key} {word}" if key in ("copy", "table") else word.strip()
-            for key, word in first.items()
+            for key, word in frame[list(keys)].iloc[inside[0]].map(str).items()
         ]
         for channel in channels:
             name = ".".join([*words, channel] if len(channels) > 1 else words)
             if name in found:
                 raise InputError(
-                    f"Expected series of different names. Received: {name!r} twice in {what}. Rename one of {', '.join(keys)}."
+                    f"Expected series of different names. Received: {name!r} twice in {what}. "
+                    f"Rename one of {', '.join(keys)}."
                 )
             found[name] = (channel, inside)
     return found

@@ -1,40 +1,52 @@
 """Finds the clock of a table by what the columns hold; names only help.
 
-Dates win, then durations, then numbers that increase and whose name speaks of time. Numbers that only look like a clock are never taken.
+Dates win, then durations, then numbers that increase and whose name speaks of time. Numbers that
+only look like a clock are never taken.
 """
 
 import re
-from collections.abc import Mapping
+import zoneinfo
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, option_text
 from enhsim_tf.telemetry.cleaning.numbers import is_text
 from enhsim_tf.telemetry.cleaning.options import UNITS_NS
-from enhsim_tf.telemetry.cleaning.times import Times, epoch_unit, refuse_two_meanings
-
-NO_TIME = (
-    "none"  # instead of the name of a time column: the table has no times, and samples are counted
+from enhsim_tf.telemetry.cleaning.times import (
+    Times,
+    compact_form,
+    epoch_unit,
+    refuse_two_meanings,
 )
+
+# instead of the name of a time column: the table has no times, and samples are counted
+NO_TIME = "none"
 _TIMES = set(
-    "time times timestamp timestamps datetime date dates epoch elapsed simtime tout unix unixtime utc utcg ts clock mjd jd datenum uptime "
-    "seconds secs millis milliseconds microseconds nanoseconds minutes hours days zeit zeitstempel zeitpunkt datum uhrzeit sekunden "
+    "time times timestamp timestamps datetime date dates epoch elapsed simtime tout unix unixtime "
+    "utc utcg ts clock mjd jd datenum uptime "
+    "seconds secs millis milliseconds microseconds nanoseconds minutes hours days zeit zeitstempel "
+    "zeitpunkt datum uhrzeit sekunden "
     "temps heure horodatage tiempo fecha hora tempo tijd".split()
 )
 _BESIDE = set(
-    "since start of run the from local gmt cet sim simulation simulated mission rel relative abs absolute system sample sampling event log logger "
-    "record recorded received created at in begin boot experiment test server day julian modified excel serial number".split()
+    "since start of run the from local gmt cet sim simulation simulated mission rel relative abs "
+    "absolute system sample sampling event log logger "
+    "record recorded received created at in begin boot experiment test server day julian "
+    "modified excel serial number "
+    "step ref reference header stamp end stop".split()
 )
+_ENDS = set("end ende stop finish until bis to fin hasta tot".split())  # of an interval
 _UNITS = {
     "D": "d day days tage",
     "h": "h hr hrs hour hours stunden",
     "min": "min mins minute minutes minuten",
     "s": "s sec secs second seconds sekunden",
-    "ms": "ms msec millis millisecond milliseconds",
-    "us": "us \u00b5s \u03bcs usec micros microsecond microseconds",
-    "ns": "ns nsec nanos nanosecond nanoseconds",
+    "ms": "ms msec msecs millis millisecond milliseconds",
+    "us": "us \u00b5s \u03bcs usec usecs micros microsecond microseconds",
+    "ns": "ns nsec nsecs nanos nanosecond nanoseconds",
 }
 _UNIT_OF = {word: unit for unit, words in _UNITS.items() for word in words.split()}
 _DAY_WORDS = ("mjd", "jd", "datenum")
@@ -51,26 +63,36 @@ _PARTS = {
 }
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
 _MOST = {"hour": 24, "minute": 59, "ms": 999}  # of a time of day
+_ADDED = {"doy": "D", "hour": "h", "minute": "min", "second": "s", "ms": "ms"}
+_RATIOS = sorted({one / other for one in UNITS_NS.values() for other in UNITS_NS.values()})
 _ZONE = re.compile(r"\b(?:[A-Z][a-z]+/[A-Z]\w+|CES?T|MES?Z|BST|JST|[ECMP][SD]T)\b")
+_COUNT = {"time": NO_TIME}  # the option of counting the samples
 _ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
 
 
 class Clock(NamedTuple):
-    """The clock of a table: the columns that make it up, none if samples are counted, and one cell per row, to be parsed as times."""
+    """The clock of a table: the columns that make it up, none if samples are counted; one cell per
+    row, to be parsed as times; and what is added to these times.
+    """
 
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
+    added: pd.Series | None = None  # time spans
 
 
 def words_of(name: str) -> list[str]:
-    """Splits the name of a column into words of letters; capitals in the middle begin a word, as in `OPCQuality`."""
+    """Splits the name of a column into words of letters; capitals in the middle begin a word, as in
+    `OPCQuality`.
+    """
     return re.findall(
         r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", name)
     )
 
 
-def _name_tells(name: str) -> tuple[int, str | None]:
-    """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit or kind of days that it states."""
+def name_tells(name: str) -> tuple[int, str | None]:
+    """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit
+    or kind of days that it states.
+    """
     if name.casefold().strip() in ("x_value", "x-axis"):  # of LabVIEW and of oscilloscopes
         return 2, None
     words = words_of(name)
@@ -118,65 +140,66 @@ def is_epoch(values: np.ndarray) -> bool:
 def find_clock(
     frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str
 ) -> Clock:
-    """Finds the clock of a table; refuses one in which several columns may be it, or one of which only the values speak for it.
+    """Finds the clock of a table; refuses one in which several columns may be it, or one of which
+    only the values speak for it.
 
-    `kinds` are those of `columns.lay_out`; `numbers` are the values of the columns of numbers that are not asked for as channels.
+    `kinds` are those of `columns.lay_out`; `numbers` are the values of the columns of numbers that
+    are not asked for as channels.
     """
-    tells = {name: _name_tells(name)[0] for name in kinds}
-    of_kind = {
-        kind: [name for name in kinds if kinds[name] == kind]
-        for kind in ("dates", "times of day", "spans")
-    }
-    dates, hours, spans = (
-        _varying(of_kind["dates"], frame),
-        of_kind["times of day"],
-        of_kind["spans"],
-    )
+    tells = {name: name_tells(name)[0] for name in kinds}
+    of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "spans")}
+    dates = _without_ends(_varying(of_kind["dates"], frame))
+    spans = of_kind["spans"]
     named = [name for name in numbers if tells[name] == 2]
-    compact = [name for name in named if _are_compact_dates(numbers[name])]
+    compact = [name for name in named if compact_form(numbers[name]) == "%Y%m%d"]
     if (joined := _joined(frame, kinds, dates or compact, numbers)) is not None:
         return joined
     if dates:
         return _one_of([name for name in dates if tells[name]] or dates, frame, what)
     if spans:
         return Clock((spans[0],), frame[spans[0]])
-    if (parts := _date_parts(frame, numbers)) is not None:
+    if (parts := _date_parts(numbers)) is not None:
         return parts
-    best = max(
-        (tells[name] for name in numbers if _may_be_clock(tells[name], numbers[name])), default=0
-    )
-    clocks = [
-        name
-        for name in numbers
-        if best and tells[name] == best and _may_be_clock(best, numbers[name])
-    ]
-    clocks = [
-        name
-        for name in clocks
-        if name == clocks[0] or not _is_same_clock(numbers[clocks[0]], numbers[name])
-    ]
+    fractions = _fractions(numbers)
+    whole = {name: values for name, values in numbers.items() if name not in sum(fractions, ())}
+    may_be = {name for name in whole if _may_be_clock(tells[name], whole[name])}
+    if fractions and not may_be:
+        (seconds, rest), *_ = fractions
+        unit = _UNIT_OF[words_of(rest)[-1].casefold()]
+        added = pd.Series(pd.to_timedelta(numbers[rest], unit=unit))
+        return Clock(fractions[0], pd.Series(numbers[seconds]), added)
+    numbers = whole
+    best = max((tells[name] for name in may_be), default=0)
+    clocks = [name for name in numbers if name in may_be and tells[name] == best]
+    # what begins again, such as the time of a step, is no clock beside one that does not
+    ahead = [name for name in clocks if not (np.diff(numbers[name]) < 0).any()]
+    first, *others = ahead or clocks or [""]
+    others = [name for name in others if not _shows_time(numbers[first], numbers[name])]
+    clocks = _without_ends([first, *others]) if first else []
     if clocks and compact and clocks != compact[:1]:
         raise InputError(
-            f"Expected a date and its time of day in one column. Received: {compact[0]!r} ({numbers[compact[0]][0]:.0f}) and {clocks[0]!r} in {what}. "
-            "Write both in one column, such as 2024-03-01T12:00:00."
+            f"Expected a date and its time of day in one column. Received: {compact[0]!r} "
+            f"({numbers[compact[0]][0]:.0f}) and {clocks[0]!r} in {what}.",
+            [_COUNT],
+            "both in one column, as 2024-03-01T12:00:00",
         )
     if clocks:
         return _one_of(clocks, frame, what)
-    for name in (
-        name
-        for name, kind in kinds.items()
-        if tells[name] == 2 and kind in ("words", "times of day")
-    ):
-        if name in hours:
+    for name, kind in kinds.items():
+        if tells[name] == 2 and kind == "times of day":
             raise InputError(
-                f"Expected times with a date. Received: {str(frame[name].dropna().iloc[0])!r} in {name!r} of {what}. Add a column of dates, or give "
-                "time 'none' (--time none) to count the samples."
+                f"Expected times with a date. Received: {str(frame[name].dropna().iloc[0])!r} in "
+                f"{name!r} of {what}.",
+                [_COUNT],
+                "a column of dates",
             )
-        return Clock((name,), frame[name])  # to be refused with its first cell
+        if tells[name] == 2 and kind == "words":
+            return Clock((name,), frame[name])  # to be refused with its first cell
     if named:
         raise InputError(
-            f"Expected a clock that increases. Received: {named[0]!r} of {what}, which is named like one and goes back. Give time (--time "
-            f"{_quoted(named[0])}) to sort by it, or --time none to count the samples."
+            f"Expected a clock that increases. Received: {named[0]!r} of {what}, which is named "
+            "like one and does not.",
+            [_COUNT, {"time": named[0]}],
         )
     _refuse_unknown(frame, kinds, numbers, what)
     return Clock()
@@ -191,7 +214,8 @@ def _may_be_clock(tells: int, values: np.ndarray) -> bool:
 def _one_of(names: list[str], frame: pd.DataFrame, what: str) -> Clock:
     if len(names) > 1:
         raise InputError(
-            f"Expected one time column. Received: {', '.join(names[:4])} in {what}. Name it (--time NAME), or {NO_TIME!r} to count samples."
+            f"Expected one time column. Received: {', '.join(names[:4])} in {what}.",
+            [*({"time": name} for name in names[:4]), _COUNT],
         )
     return Clock((names[0],), frame[names[0]])
 
@@ -211,8 +235,9 @@ def _refuse_unknown(
     if ramp is not None and sum(kind == "numbers" for kind in kinds.values()) > 1:
         step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
         raise InputError(
-            f"Expected to know the clock. Received: {ramp!r} of {what}, which increases in steps of {step:g}, as a clock or a "
-            f"counter does. Give --time {_quoted(ramp)} (with --time-format ms or another unit if it does not count seconds), or --time none."
+            f"Expected to know the clock. Received: {ramp!r} of {what}, which increases in steps "
+            f"of {step:g}, as a clock or a counter does.",
+            [{"time": ramp}, {"time": ramp, "time_format": "ms"}, _COUNT],
         )
     for name in (name for name, kind in kinds.items() if kind == "words"):
         cells = frame[name].dropna().astype("str").iloc[:1_000]
@@ -222,20 +247,23 @@ def _refuse_unknown(
             and cells.iloc[:_FEWEST].str.contains(r"\d").all()
         ):
             raise InputError(
-                f"Expected to know the clock. Received: {cells.iloc[0][:40]!r} in {name!r} of {what}, which may be a time of an unknown form. Give "
-                f"--time {_quoted(name)} with --time-format, or --time none."
+                f"Expected to know the clock. Received: {cells.iloc[0][:40]!r} in {name!r} of "
+                f"{what}, which may be a time of an unknown form.",
+                [_COUNT],
+                f"{option_text({'time': name})} with --time-format",
             )
 
 
 def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
-    """Returns the unit or kind of days that the name of a clock's one column or the line of units states, or None.
+    """Returns the unit or kind of days that the name of a clock's one column or the line of units
+    states, or None.
 
     Raises an `InputError` if the column holds days whose kind is not known.
     """
     if len(clock.columns) != 1:
         return None
     name = clock.columns[0]
-    form = _name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
+    form = name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
     if (
         form is None
         and pd.api.types.is_numeric_dtype(clock.cells.dtype)
@@ -249,7 +277,9 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
 def offset_of(
     clock: Clock, frame: pd.DataFrame, zone: str | None, what: str
 ) -> pd.Timedelta | None:
-    """Returns the offset in a clock's name, as in `Time, GMT+02:00`, or None; refuses other statements of a zone, unless `zone` is given."""
+    """Returns the offset in a clock's name, as in `Time, GMT+02:00`, or None; refuses other
+    statements of a zone, unless `zone` is given.
+    """
     named = " ".join(clock.columns)
     if found := re.search(r"(?<!Etc/)\b(?:UTC|GMT) ?([+-]\d\d?)(?::?(\d\d))?\b", named):
         return pd.Timedelta(f"{found[1]}:{found[2] or '00'}:00")
@@ -258,68 +288,163 @@ def offset_of(
         for name in frame
         if _ZONE_COLUMN.search(name) or name.casefold() == "tz" and is_text(frame[name])
     ]
-    if zone is None and (_ZONE.search(named) or beside and "utc" not in named.casefold()):
+    is_named = (found := _ZONE.search(named)) and (
+        "/" not in found[0] or found[0] in zoneinfo.available_timezones()
+    )
+    if zone is None and (is_named or beside and "utc" not in named.casefold()):
         raise InputError(
-            f"Expected times that state their zone. Received: {', '.join(dict.fromkeys([named, *beside]))} in {what}, where a zone is named "
-            "that is not read. Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)."
+            "Expected times that state their zone. Received: "
+            f"{', '.join(dict.fromkeys([named, *beside]))} in {what}, where a zone is named "
+            "that is not read.",
+            [{"timezone": "UTC"}],
+            "the zone of the clock, as Europe/Berlin",
         )
     return None
+
+
+def _without_ends(names: list[str]) -> list[str]:
+    """Leaves out the ends of intervals beside their beginnings."""
+    return [
+        name for name in names if not _ENDS & {word.casefold() for word in words_of(name)}
+    ] or names
+
+
+def _fractions(numbers: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
+    """Returns the pairs of columns of whole seconds and of the fractions of a second behind them,
+    of names that are alike apart from their units.
+    """
+    stems: dict[tuple[str, ...], str] = {}
+    for name in numbers:
+        *stem, last = [word.casefold() for word in words_of(name)] or [""]
+        stems[(*stem, _UNIT_OF.get(last, ""))] = name
+    pairs = []
+    for (*stem, unit), name in stems.items():
+        seconds = stems.get((*stem, "s"))
+        if unit in ("ms", "us", "ns") and seconds is not None:
+            rest = numbers[name]
+            is_part = _are_whole(rest, 0, UNITS_NS["s"] / UNITS_NS[unit] - 1)
+            wraps = (np.diff(rest) < 0).any() or np.ptp(numbers[seconds]) == 0
+            if is_part and (numbers[seconds] % 1 == 0).all() and wraps:
+                pairs.append((seconds, name))
+    return pairs
+
+
+def _are_whole(values: np.ndarray, least: float, most: float) -> bool:
+    return bool(((values >= least) & (values <= most) & (values % 1 == 0)).all())
+
+
+def refuse_own_clocks(
+    frame: pd.DataFrame,
+    kinds: Mapping[str, str],
+    numbers: Mapping[str, np.ndarray],
+    asked: Collection[str],
+    what: str,
+) -> None:
+    """Refuses signals that each have a clock of their own in front of them, unless those of one
+    clock are asked for.
+    """
+    groups: dict[str, list[str]] = {}
+    for name in frame:
+        if kinds[name] == "dates" or name in numbers and _is_named_clock(name, numbers[name]):
+            groups[name] = []
+        elif groups and kinds[name] == "numbers":
+            groups[list(groups)[-1]].append(name)
+    if len(groups) < 2 or not all(groups.values()) or frame.columns[0] not in groups:
+        return
+    first, *others = groups
+    if len({kinds[name] for name in groups}) > 1 or any(
+        asked and asked <= set(group) for group in map(set, groups.values())
+    ):
+        return
+    if not all(
+        (frame[name] == frame[first]).all()
+        if kinds[first] == "dates"
+        else _is_nearly(numbers[first], numbers[name])
+        for name in others
+    ):
+        raise InputError(
+            f"Expected one clock. Received: {len(groups)} in {what}, each with signals of its own "
+            f"({', '.join(list(groups)[:4])}).",
+            [{"time": name, "columns": group} for name, group in groups.items()],
+        )
+
+
+def _is_named_clock(name: str, values: np.ndarray) -> bool:
+    return name_tells(name)[0] == 2 and _may_be_clock(2, values[np.isfinite(values)])
+
+
+def _is_nearly(first: np.ndarray, second: np.ndarray) -> bool:
+    """Whether two columns are the same but for rounding and their unit."""
+    is_alike = (np.isfinite(first) == np.isfinite(second)).all()
+    return is_alike and any(_is_small(second - ratio * first, second) for ratio in _RATIOS)
+
+
+def _is_small(off: np.ndarray, values: np.ndarray) -> bool:
+    """Whether values are off by no more than rounding them to whole numbers, or than most of their
+    usual step.
+    """
+    known = values[np.isfinite(values)]
+    rounding = (known % 1 == 0).all() and np.ptp(known) >= 3
+    return np.nanmax(np.abs(off)) <= max(rounding, 0.6 * np.median(np.abs(np.diff(known))))
 
 
 def further_clocks(
     clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], kinds: Mapping[str, str]
 ) -> set[str]:
     """Returns the columns that show the time once more, or show it although samples are counted."""
-    found = {name for name in numbers if _name_tells(name)[0] == 2} | {
-        name for name, kind in kinds.items() if kind == "dates"
+    found = {name for name in numbers if name_tells(name)[0] == 2} | {
+        name for name, kind in kinds.items() if kind in ("dates", "times of day")
     }
     if times is None:
-        parts = _date_parts(pd.DataFrame(numbers), numbers) or Clock()
+        parts = _date_parts(numbers) or Clock()
         return found.union(
             parts.columns,
             (
                 name
                 for name, values in numbers.items()
-                if _may_be_clock(_name_tells(name)[0], values)
+                if _may_be_clock(name_tells(name)[0], values)
             ),
         )
-    own = np.where(times.stamps.isna(), np.nan, times.stamps.as_unit("ns").asi8.astype(np.float64))
+    known = np.where(times.stamps.isna(), np.nan, times.stamps.as_unit("ns").asi8.astype(float))
     for name, values in numbers.items():
-        words = re.findall(r"[^\W\d_]+", name.casefold())
-        is_named = (
-            _name_tells(name)[0] > 0
-            or bool(words)
-            and all(word in _UNIT_OF or word in _BESIDE for word in words)
-        )
+        split = words_of(name)
+        words = {word.casefold() for word in split}
+        is_named = name_tells(name)[0] > 0 or words and words <= _BESIDE.union(_UNIT_OF)
+        is_named = is_named or split[:1] == ["t"]  # t-Step[s] of battery cyclers
         if (
             name not in clock.columns
             and (is_named or is_epoch(values))
-            and _is_same_clock(own, values)
+            and _shows_time(known, values)
         ):
             found.add(name)
     return found
 
 
-def _is_same_clock(first: np.ndarray, second: np.ndarray) -> bool:
-    """Whether two columns show the same time, perhaps from another zero and in another unit."""
-    both = np.isfinite(first) & np.isfinite(second)
-    first, second = first[both], second[both]
-    if len(first) < 3 or np.ptp(first) == 0 or np.ptp(second) == 0:
+def _shows_time(times: np.ndarray, values: np.ndarray) -> bool:
+    """Whether a column shows times once more: from another zero, in another unit, rounded, or so
+    that it begins again now and then.
+    """
+    both = np.isfinite(times) & np.isfinite(values)
+    times = times[both] - np.min(times[both], initial=np.inf)
+    values = values[both] - np.min(values[both], initial=np.inf)
+    if len(times) < 3 or np.ptp(values) == 0:
         return False
-    low, high = int(np.argmin(first)), int(np.argmax(first))
-    slope = (second[high] - second[low]) / (first[high] - first[low])
-    units = [float(unit) for unit in UNITS_NS.values()]
-    if (
-        slope <= 0
-        or min(abs(slope * above / below - 1) for above in units for below in units) > 1e-3
-    ):
-        return False
-    off = second - second[low] - slope * (first - first[low])
-    return bool(np.abs(off).max() <= 0.6 * np.median(np.abs(np.diff(second))))
+    steps = np.diff(times)
+    own = np.diff(values)
+    sizes = np.ptp(values), np.median(np.abs(own))
+    spans = np.ptp(times), np.median(np.abs(steps))
+    return any(
+        np.mean((np.abs(own / ratio - steps) <= 0.05 * steps) & (steps > 0)) > 0.4
+        or _is_small(values - ratio * times, values)
+        for ratio in _RATIOS
+        if any(size / 2 < ratio * span < 2 * size for size, span in zip(sizes, spans, strict=True))
+    )
 
 
 def _varying(names: list[str], frame: pd.DataFrame) -> list[str]:
-    """Leaves out columns that hold the same date throughout, such as the range of a query, unless no other is left."""
+    """Leaves out columns that hold the same date throughout, such as the range of a query, unless
+    no other is left.
+    """
     varying = [
         name
         for name in names
@@ -328,115 +453,88 @@ def _varying(names: list[str], frame: pd.DataFrame) -> list[str]:
     return varying or names[:1]
 
 
-def _are_compact_dates(values: np.ndarray) -> bool:
-    """Whether numbers are dates such as 20240301."""
-    if not len(values) or not ((values > 1.9e7) & (values < 2.2e7) & (values % 1 == 0)).all():
-        return False
-    return bool(
-        pd.to_datetime(
-            pd.Series(np.unique(values)).astype(np.int64).astype(str),
-            format="%Y%m%d",
-            errors="coerce",
-        )
-        .notna()
-        .all()
-    )
-
-
 def _joined(
     frame: pd.DataFrame,
     kinds: Mapping[str, str],
     dates: list[str],
     numbers: Mapping[str, np.ndarray],
 ) -> Clock | None:
-    """Returns the clock that a column of dates and columns of the time of day, in text or whole numbers, make together, or None."""
-    hours, digits = [name for name in kinds if kinds[name] == "times of day"], {}
+    """Returns the clock that a column of dates and columns of the time of day, in text or whole
+    numbers, make together, or None.
+    """
+    hours = _without_ends([name for name in kinds if kinds[name] == "times of day"])
     if len(dates) != 1 or len(hours) > 1:
         return None
-    for name, values in numbers.items():
-        part = _PART_OF.get(name.casefold())
-        if part in _MOST and ((values >= 0) & (values <= _MOST[part]) & (values % 1 == 0)).all():
-            digits[part] = pd.Series(values, name=name).map(
-                f"{{:0{len(str(_MOST[part]))}.0f}}".format
-            )
-    if not (hours or digits):
-        return None
-    cells, pieces = frame[dates[0]], [(".", digits["ms"])] if "ms" in digits else []
-    if not (is_day := _has_no_time(cells)):
-        pieces = (
-            pieces
-            if is_text(cells)
-            and cells.dropna().iloc[:200].astype("str").str.fullmatch(r".*:\d\d:\d\d").all()
-            else []
-        )
-    elif hours:
-        halves = [
+    cells = frame[dates[0]]
+    if dates[0] in numbers:
+        text = numbers[dates[0]].astype(np.int64).astype(str)
+        cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
+    has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # who keeps a zone keeps times
+    local = cells.dt.tz_convert(None) if has_zone else cells  # far dates have no text with a zone
+    head = local.dropna().iloc[:200].astype("str")
+    is_day = not has_zone and not head.str.contains(r":|T\d|\d{8}\d").any()
+    whole_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
+    parts = {
+        part: name
+        for part, name in _parts_of(numbers).items()
+        if _are_whole(numbers[name], 0, _MOST.get(part, -1))
+    }
+    if hours and is_day or not is_day and "ms" in parts and whole_seconds:
+        parts = {part: name for part, name in parts.items() if part == "ms"}
+    elif not is_day or "hour" not in parts:
+        parts = {}
+    texts = hours if is_day else []
+    if texts:
+        texts = hours + [
             name
             for name, kind in kinds.items()
             if kind == "words" and frame[name].dropna().isin(["AM", "PM"]).all()
         ]
-        pieces = [
-            (" ", frame[name].astype("str").str.strip()) for name in (*hours, *halves[:1])
-        ] + pieces
-    elif "hour" in digits:
-        pieces = [
-            (" ", digits["hour"]),
-            (":", digits.get("minute", digits["hour"].mask(digits["hour"].notna(), "00"))),
-        ]
-    if not pieces:
-        return None
-    day = (
-        cells.dt.strftime("%Y-%m-%d")
-        if pd.api.types.is_datetime64_any_dtype(cells.dtype)
-        else cells.astype("str").str.strip()
-    )
-    joined = day.ffill() if is_day else day  # a date may stand in the first row of each day only
-    for mark, piece in pieces:
-        joined += mark + piece
-    return Clock(tuple(dict.fromkeys([dates[0], *(piece.name for _, piece in pieces)])), joined)
+        if pd.api.types.is_datetime64_any_dtype(cells.dtype):
+            cells = cells.dt.strftime("%Y-%m-%d")
+        # a date may stand in the first row of each day only
+        cells = cells.astype("str").str.strip().ffill()
+        for name in texts:
+            cells = cells + " " + frame[name].astype("str").str.strip()
+    columns = (dates[0], *texts, *parts.values())
+    return Clock(columns, cells, _added(numbers, parts)) if len(columns) > 1 else None
 
 
-def _has_no_time(cells: pd.Series) -> bool:
-    if isinstance(cells.dtype, pd.DatetimeTZDtype):  # who keeps a zone keeps times
-        return False
-    head = cells.dropna().iloc[:200]
-    if pd.api.types.is_datetime64_any_dtype(cells.dtype):
-        return bool((head == head.dt.normalize()).all())
-    return not head.astype("str").str.contains(r":|T\d|\d{8}\d").any()
-
-
-def _date_parts(frame: pd.DataFrame, numbers: Mapping[str, np.ndarray]) -> Clock | None:
-    """Returns the clock of columns for the year, the month and day or the day of year, and perhaps the time of day, or None."""
-    found = {}
+def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
+    """Returns the columns that are named like parts of a date or a time of day, by these parts."""
+    found: dict[str, str] = {}
     for name in numbers:
-        part = _PART_OF.get(re.sub(r"[^a-z]", "", name.casefold()))
-        if name.strip().casefold() == "mm" and {"month", "doy"} & set(
-            found
-        ):  # the second of `MM` and `mm`
+        part = _PART_OF.get(re.sub(r"\W|_", "", name.casefold()))
+        # the second of `MM` and `mm`
+        if name.strip().casefold() == "mm" and {"month", "doy"} & set(found):
             part = "minute"
         if part is not None:
             found.setdefault(part, name)
-    if "year" not in found or not {"doy", "month"} & set(found):
-        return None
-    values = {part: pd.Series(numbers[name]) for part, name in found.items()}
-    years, first = values["year"].dropna(), pd.Series(1.0, index=frame.index)
-    if not len(years) or (years % 1 != 0).any() or not years.between(1900, 2200).all():
-        return None
-    days = {part: first if "doy" in found else values.get(part, first) for part in ("month", "day")}
-    stamps = pd.to_datetime({"year": values["year"]} | days, errors="coerce").astype(
-        "datetime64[ns]"
-    )
-    for part, unit in (
-        ("doy", "D"),
-        ("hour", "h"),
-        ("minute", "min"),
-        ("second", "s"),
-        ("ms", "ms"),
-    ):
-        if part in found:
-            stamps += pd.to_timedelta(values[part] - (part == "doy"), unit=unit)
-    return Clock(tuple(found[part] for part in _PARTS if part in found), stamps.dt.round("ms"))
+    return found
 
 
-def _quoted(name: str) -> str:
-    return name if re.fullmatch(r"[\w.-]+", name) else f"'{name}'"
+def _added(numbers: Mapping[str, np.ndarray], parts: Mapping[str, str]) -> pd.Series | None:
+    """Returns the sum of the parts of a time of day, and of days of a year; None without any."""
+    spans = [
+        pd.Series(pd.to_timedelta(numbers[parts[part]] - (part == "doy"), unit=unit))
+        for part, unit in _ADDED.items()
+        if part in parts
+    ]
+    return sum(spans[1:], spans[0]).dt.round("ms") if spans else None
+
+
+def _date_parts(numbers: Mapping[str, np.ndarray]) -> Clock | None:
+    """Returns the clock of columns for the year, the month and day or the day of year, and perhaps
+    the time of day, or None.
+    """
+    parts = _parts_of(numbers)
+    if not {"doy", "month"} & set(parts) or "year" not in parts:
+        return None
+    years = numbers[parts["year"]]
+    if not _are_whole(years[np.isfinite(years)], 1900, 2200):
+        return None
+    of_date = ("month", "day") if "doy" not in parts else ()
+    days = {part: numbers[parts[part]] if part in parts else 1.0 for part in of_date}
+    days = pd.DataFrame({"year": years, "month": 1.0, "day": 1.0} | days)
+    stamps = pd.to_datetime(days, errors="coerce").astype("datetime64[ns]")
+    return Clock(tuple(parts.values()), stamps, _added(numbers, parts))

@@ -1,4 +1,6 @@
-"""Says what each column of a table is: clock, label, quality flag, row number, key of several series, or channel."""
+"""Says what each column of a table is: clock, label, quality flag, row number, key of several
+series, or channel.
+"""
 
 import dataclasses
 import datetime
@@ -8,46 +10,56 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
-from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
+from enhsim_tf.telemetry.cleaning.times import (
+    DURATION,
+    LOOK,
+    TIME_OF_DAY,
+    Times,
+    date_forms,
+    parse_times,
+)
 from enhsim_tf.telemetry.reading.clock import (
     NO_TIME,
     Clock,
     find_clock,
     further_clocks,
-    is_epoch,
     offset_of,
+    refuse_own_clocks,
     unit_of,
     words_of,
 )
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set(
-    "anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split()
+    (
+        "anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty "
+        "changepoint groundtruth"
+    ).split()
 )
 _FLAGS = set("quality qc qa flag flags valid validity mask".split())
 _ROWS = set(
-    "index idx row rows rownumber record recordnumber id no nr sample samples number entry scan seq counter".split()
+    (
+        "index idx row rows rownumber record recordnumber id no nr sample samples number entry "
+        "scan seq counter"
+    ).split()
 )
 _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
 _LABELLED = {"severity", "onset", "end", "mask"}
-_WRITTEN = (
-    _LABELLED,
-    {"value", "score", "flag"},
-    {"copy", "value", "out_of_range"},
-)  # columns that give away a file of the commands
-_OWN = _LABELLED.union(
-    "scenario enhanced score score_after flag out_of_range".split()
-)  # what these have beside the values
+# columns that give away a file of the commands
+_WRITTEN = (_LABELLED, {"value", "score", "flag"}, {"copy", "value", "out_of_range"})
+# what these have beside the values
+_OWN = _LABELLED.union("scenario enhanced score score_after flag out_of_range".split())
 _MAX_STATES = 10  # a label or flag has at most this many different values
 _OBJECTS = {
     "dates": datetime.date | np.datetime64,
     "times of day": datetime.time,
     "spans": datetime.timedelta,
 }
-_TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
+_UNNAMED = re.compile(r"column 0|Unnamed: \d+|level_0").fullmatch
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -59,19 +71,21 @@ class Layout:
     channels: tuple[str, ...]
     labels: tuple[str, ...]  # which mark anomalous rows
     words: tuple[str, ...]  # which may tell several series apart
-    left_out: Mapping[
-        str, Sequence[str]
-    ]  # the other columns by the kind of finding that reports them
+    # the other columns by the kind of finding that reports them
+    left_out: Mapping[str, Sequence[str]]
 
 
 def lay_out(
     table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str
 ) -> Layout:
-    """Says what each column of a table, in which no name repeats, is; raises an `InputError` if the clock cannot be told.
+    """Says what each column of a table, in which no name repeats, is; raises an `InputError` if the
+    clock cannot be told.
 
-    `columns` are those that were asked for as channels, and `time` is the name of the time column or `NO_TIME`.
+    `columns` are those that were asked for as channels, and `time` is the name of the time column
+    or `NO_TIME`.
     """
-    frame, asked = table.frame, set(columns or ())
+    frame = table.frame
+    asked = set(columns or ())
     kinds = {name: _kind_of(frame[name]) for name in frame.columns}
     if "%" in (options.time_format or ""):
         kinds |= {
@@ -79,6 +93,16 @@ def lay_out(
             for name in frame.columns
             if name not in asked and _fits(frame[name], str(options.time_format))
         }
+    # of a family such as D1, D2, ... of which one holds hexadecimal numbers, all do
+    families = {name: name.rstrip("0123456789") for name in kinds}
+    hexadecimal = {
+        family
+        for name, family in families.items()
+        if family != name
+        and kinds[name] == "words"
+        and _are_hex(frame[name].dropna().iloc[:LOOK].astype("str"))
+    }
+    kinds |= {name: "words" for name in kinds if families[name] in hexadecimal - {name}}
     numbers = {
         name: _values(frame[name], table.decimal)
         for name, kind in kinds.items()
@@ -114,6 +138,7 @@ def lay_out(
             if _numbers_rows(name, numbers[name]) or is_influx and name == "table"
         ],
     )
+    refuse_own_clocks(frame, kinds, numbers, asked, what)
     if time is None:
         free = {name: kind for name, kind in kinds.items() if not roles.get(name)}
         clock = find_clock(
@@ -129,6 +154,9 @@ def lay_out(
         form = options.time_format or unit_of(clock, table.units, what)
         of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
         times = parse_times(clock.cells, of_what, options.drop_bad, form, table.places)
+        if clock.added is not None:
+            stamps = times.stamps + pd.TimedeltaIndex(clock.added)
+            times = dataclasses.replace(times, stamps=stamps)
         if (
             not times.zone
             and (offset := offset_of(clock, frame, options.timezone, what)) is not None
@@ -139,11 +167,19 @@ def lay_out(
     take("clock", clock.columns)
     take("further clocks", further_clocks(clock, times, numbers, kinds))
     counted = [
-        name for name in numbers if name not in roles and clock.columns and _counts(numbers[name])
+        name
+        for name, values in numbers.items()
+        if name not in roles
+        and (
+            clock.columns
+            and _counts(values)
+            or _UNNAMED(name)
+            and len(np.unique(values)) == len(values)
+            and not (values % 1).any()
+        )
     ]
-    if len(counted) < sum(
-        not roles.get(name) for name in numbers
-    ):  # if the only column counts, it is the channel
+    # if the only column counts, it is the channel
+    if len(counted) < sum(not roles.get(name) for name in numbers):
         take("row numbers", counted)
     channels = [name for name in numbers if not roles.get(name)] if columns is None else columns
     words = tuple(name for name, kind in kinds.items() if kind == "words" and not roles.get(name))
@@ -157,7 +193,8 @@ def lay_out(
 
 
 def _kind_of(cells: pd.Series) -> str:
-    """Says what a column holds: "numbers", "dates", "spans" of time, "times of day", "words", other "objects", or nothing ("empty").
+    """Says what a column holds: "numbers", "dates", "spans" of time, "times of day", "words", other
+    "objects", or nothing ("empty").
 
     Text that holds at least some numbers is numbers.
     """
@@ -182,18 +219,20 @@ def _kind_of(cells: pd.Series) -> str:
     for kind, classes in _OBJECTS.items():
         if isinstance(given.iloc[0], classes):
             return kind
-    if not parse_numbers(given, "", drop=True, units=False)[1].all():
-        return "numbers"
     text = (
         given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)]
         .astype("str")
         .str.strip()
     )
+    if len(text) == len(given) and _are_hex(text):
+        return "words"
+    if not parse_numbers(given, "", drop=True, units=False)[1].all():
+        return "numbers"
     if len(text) < len(given) / 2:
         return "objects"
     if has_commas(text):  # which are refused where they can be read in two ways
         return "numbers"
-    for kind, pattern in (("spans", DURATION), ("times of day", _TIME_OF_DAY)):
+    for kind, pattern in (("spans", DURATION), ("times of day", TIME_OF_DAY)):
         if text.str.fullmatch(pattern).mean() > 0.5:
             return kind
     return (
@@ -202,6 +241,16 @@ def _kind_of(cells: pd.Series) -> str:
         else "words"
         if parse_numbers(given, "", drop=True)[1].all()
         else "numbers"
+    )
+
+
+def _are_hex(text: pd.Series) -> bool:
+    """Whether text is hexadecimal numbers of one length, some with letters."""
+    return (
+        text.str.len().nunique() == 1
+        and bool(text.str.fullmatch("(?:0[xX])?[0-9A-Fa-f]{2,}").all())
+        and bool(text.str.contains("[A-Fa-f]").any())
+        and not text.str.fullmatch(r"\d+[eE]\d+|\d+").all()
     )
 
 
@@ -226,33 +275,25 @@ def _has_states(cells: pd.Series, kind: str) -> bool:
 def _labels_of(
     frame: pd.DataFrame, kinds: Mapping[str, str], asked: set[str], options: Cleaning
 ) -> list[str]:
-    """Returns the columns that label anomalous rows: those that the options name, or those whose name and values show it."""
+    """Returns the columns that label anomalous rows: those that the options name, or those whose
+    name and values show it.
+    """
     if options.label_column is not None:
         return [] if options.label_column == (NO_TIME,) else list(options.label_column)
     found = [
         name
         for name, kind in kinds.items()
-        if name not in asked
-        and _words_of(name) & _LABELS
-        and kind in ("numbers", "words")
-        and _has_states(frame[name], kind)
+        if name not in asked and _words_of(name) & _LABELS and _has_states(frame[name], kind)
     ]
     return [*found, "mask"] if _LABELLED <= {*frame.columns} - asked else found
 
 
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
     """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
-    is_unnamed = bool(re.fullmatch(r"column 0|Unnamed: \d+|level_0", name)) and not is_epoch(values)
     words = {word.casefold() for word in words_of(name)}
-    if (
-        not (is_unnamed or words <= _ROWS and words)
-        or not np.isfinite(values).all()
-        or (values % 1).any()
-    ):
+    if not (_UNNAMED(name) or words and words <= _ROWS):
         return False
-    if (is_unnamed or len(values) < 2) and len(np.unique(values)) == len(values):
-        return True
-    return len(values) > 1 and bool(np.mean(np.diff(values) == 1) >= 0.9)
+    return len(values) == 1 or bool(len(values)) and bool(np.mean(np.diff(values) == 1) >= 0.9)
 
 
 def _counts(values: np.ndarray) -> bool:
@@ -263,47 +304,25 @@ def _counts(values: np.ndarray) -> bool:
 def _fits(cells: pd.Series, form: str) -> bool:
     """Whether most cells are dates of a given format."""
     head = cells.dropna().iloc[:LOOK]
-    if pd.api.types.is_float_dtype(head.dtype) or not (
-        is_text(head) or pd.api.types.is_integer_dtype(head.dtype)
-    ):
+    if not len(head) or not (is_text(head) or pd.api.types.is_integer_dtype(head.dtype)):
         return False
     try:
-        return bool(
-            pd.to_datetime(head.astype(str).str.strip(), format=form, errors="coerce", utc=True)
-            .notna()
-            .mean()
-            > 0.5
-        )
-    except (
-        ValueError,
-        TypeError,
-        KeyError,
-        IndexError,
-        OverflowError,
-        re.error,
-    ):  # an invalid format, which the parser of times refuses
+        return bool(parse_times(head, "", drop=True, form=form).bad.mean() < 0.5)
+    except InputError:  # an invalid format, which is refused when the clock is read
         return False
 
 
 def anomalous(cells: pd.Series) -> np.ndarray | None:
     """Says which rows a column labels as anomalous: a mask, or None if its values do not show it.
 
-    It holds true and false, 0 and others, -1 and 1 (where -1 is anomalous), or words such as "normal" and "attack".
+    It holds true and false, 0 and others, -1 and 1 (where -1 is anomalous), or words such as
+    "normal" and "attack".
     """
-    if pd.api.types.is_bool_dtype(cells.dtype):
-        return cells.to_numpy(bool)
-    objects = cells.astype(object)
-    values, bad, _ = parse_numbers(
-        objects.map(lambda cell: int(cell) if isinstance(cell, bool | np.bool_) else cell),
-        "",
-        drop=True,
-    )
-    if not bad.any():
-        states = set(values[np.isfinite(values)].tolist())
-        if states == {-1.0, 1.0}:
-            return values == -1
-        return np.isfinite(values) & (values != 0) if 0 in states or states <= {1.0} else None
-    missing, words = is_missing(objects), cells.astype("str").str.strip().str.casefold()
-    if not words[~missing].isin(_NORMAL).any() and not words[~missing].isin(_ANOMALOUS).all():
+    missing = is_missing(cells.astype(object))
+    words = cells.astype("str").str.strip().str.casefold().str.removesuffix(".0")
+    given = words[~missing]
+    if set(given) == {"-1", "1"}:
+        return (words == "-1").to_numpy(bool)
+    if not given.isin(_NORMAL).any() and not given.isin(_ANOMALOUS).all():
         return None
     return ~(words.isin(_NORMAL) | missing).to_numpy(bool)

@@ -1,19 +1,33 @@
-"""Finds out how a text file is written: its encoding, separator, and the line that holds the columns' names."""
+"""Finds out how a text file is written: its encoding, separator, and the line that holds the
+columns' names.
+"""
 
 import csv
 import dataclasses
 import re
 from collections.abc import Sequence
+from typing import NoReturn
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.report import Finding
 
 BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
+_WHOLE = ""  # the separator of files of one column
 _SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal sign
-_HEAD_LINES, _HEAD = 120, 4_000_000  # lines and characters that are inspected
+# lines and characters that are inspected
+_HEAD_LINES = 300
+_HEAD = 4_000_000
 _LOOK = 50  # columns that are inspected
-_NUMBER = r"(?:[+-] *)?(?:\d[\d.,'\u2019 \u00a0\u202f]*|[.,]\d+)(?:[de][+-]?\d+)?(?: ?(?:[num\u00b5]?s|sec|min|h|hr|days?|%))?"
-_DATE = r"\d{1,4}[-/.: ]\d.*|\d{8}T.*|\d{1,2}[-/ ][a-z]{3}.*|(?:[a-z]{3}, )?\d{1,2} [a-z]{3} .*|[a-z]{3}\.? +\d{1,2},? +\d.*"
+csv.field_size_limit(_HEAD)  # with another separator than its own, a line is one cell
+_NUMBER = (
+    r"(?:[+-] *)?(?:\d[\d.,'\u2019 \u00a0\u202f]*|[.,]\d+)(?:[de][+-]?\d+)?"
+    r"(?: ?(?:[num\u00b5]?s|sec|min|h|hr|days?|%))?"
+)
+_DATE = (
+    r"\d{1,4}[-/.: ]\d.*|\d{8}T.*|\d{1,2}[-/ ][a-z]{3}.*|"
+    r"(?:[a-z]{3}, )?\d{1,2} [a-z]{3} .*|[a-z]{3}\.? +\d{1,2},? +\d.*"
+)
+_FORMAT = re.compile(r"\d+[sdn]").fullmatch
 _SOLID = re.compile(f"(?:{_NUMBER}|{_DATE}|[+-]?inf(?:inity)?)$", re.IGNORECASE)
 
 
@@ -27,10 +41,13 @@ class Dialect:
     skipped: int  # number of lines before the data that are neither names nor blank
     head: list[list[str]]  # cells of the first rows of data
     units: Sequence[str] = ()  # cells of the line between the names and the data, where units stand
+    may_lack_last: bool = False  # whether rows may leave out the last cell
 
 
 def decode(content: bytes) -> tuple[str, list[Finding]]:
-    """Decodes the content of a text file, and returns findings for the cleaning log; raises a `ValueError` if it is not text."""
+    """Decodes the content of a text file, and returns findings for the cleaning log; raises a
+    `ValueError` if it is not text.
+    """
     findings = []
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = content.decode("utf-16")
@@ -56,47 +73,56 @@ def decode(content: bytes) -> tuple[str, list[Finding]]:
 
 
 def find_dialect(text: str, name: str, no_header: bool, separator: str | None = None) -> Dialect:
-    """Finds the separator, if it is not known, the names and the beginning of the data, from the first part of a text.
+    """Finds the separator, if it is not known, the names and the beginning of the data, from the
+    first part of a text.
 
     Raises:
         InputError: If there is no line of names above the data, and `no_header` is False.
         ValueError: If there is nothing but comments.
     """
     lines = [line.rstrip("\r") for line in text[:_HEAD].split("\n", _HEAD_LINES)[:_HEAD_LINES]]
-    if stated := re.fullmatch(
-        r'"?sep=(.)"?', lines[0].strip(" \ufeff")
-    ):  # as spreadsheets write it
-        lines[0], separator = "", stated[1]
+    # as spreadsheets write it
+    if stated := re.fullmatch(r'"?sep=(.)"?', lines[0].strip(" \ufeff")):
+        lines[0] = ""
+        separator = stated[1]
     if not any(map(_is_content, lines)):
         raise ValueError("it is empty")
-    layouts = [_lay_out(mark, _split(lines, mark), no_header) for mark in separator or _SEPARATORS]
-    if not any(each and len(each.names) > 1 for each in layouts):
-        layouts = [
-            _lay_out(
-                BLANKS, [line.split() if _is_content(line) else [] for line in lines], no_header
-            )
-        ]
-    found = [each for each in layouts if each and len(each.names) > 1]
-    if not found or found[0].separator == BLANKS:
-        single = _lay_out(
-            ",", [[line.strip()] if _is_content(line) else [] for line in lines], no_header
-        )
-        found += [single] if single else []
-    with_header = [each for each in found if any(each.names)]
-    best = max(
-        with_header or found, key=lambda each: len(each.names) if with_header else 0, default=None
-    )
-    if best is None:
+    found = [_lay_out(mark, lines, no_header) for mark in separator or _SEPARATORS]
+    found = [layout for layout in found if layout and len(layout.names) > 1]
+    if not found:
+        by_blanks, single = (_lay_out(mark, lines, no_header) for mark in (BLANKS, _WHOLE))
+        has_blanks = by_blanks is not None and len(by_blanks.names) > 1
+        found = [by_blanks if has_blanks else single]
+    if found == [None]:
         raise ValueError("lines of different lengths")
+    with_header = [layout for layout in found if any(layout.names)]
+    best = max(with_header, key=lambda layout: len(layout.names), default=found[0])
     if not with_header and not no_header:
         best = _named_by_comment(best, lines)
         if best is None:
-            raise InputError(
-                f"Expected a header line with the columns' names. Received: {', '.join(found[0].head[0][:4]) if found[0].head else 'none'} "
-                f"in {name}. Add a line of names on top, or give no_header=True (--no-header)."
-            )
+            _refuse_header(found[0], lines, name)
     return dataclasses.replace(
         best, names=[each or f"column {number}" for number, each in enumerate(best.names)]
+    )
+
+
+def _refuse_header(found: Dialect, lines: Sequence[str], name: str) -> NoReturn:
+    """Refuses data without a line of names above it, or with one of another number of names."""
+    above = [number for number in range(found.first_line) if _is_content(lines[number])]
+    cells = _split(lines[above[-1] : above[-1] + 1], found.separator)[0] if above else []
+    width = len(found.names)
+    marks = found.separator != BLANKS
+    if marks and len(cells) > width and not any(map(_SOLID.match, cells)):
+        raise InputError(
+            f"Expected as many names as values. Received: {len(cells)} names in line "
+            f"{above[-1] + 1} of {name}, above {width} values.",
+            otherwise="names with a separator inside in quotation marks, or rename them",
+        )
+    first = ", ".join(found.head[0][:4]) if found.head else "none"
+    raise InputError(
+        f"Expected a header line with the columns' names. Received: {first} in {name}.",
+        [{"no_header": True}],
+        "a line of names on top",
     )
 
 
@@ -108,95 +134,92 @@ def _split(lines: Sequence[str], mark: str) -> list[list[str]]:
     """Splits lines into cells; comments and blank lines have none."""
     rows = []
     for line in lines:
-        cells = (
-            next(
-                csv.reader(
-                    [line.replace("\r", " ")], delimiter=mark, skipinitialspace=mark != "\t"
-                ),
-                [],
-            )
-            if _is_content(line)
-            else []
-        )
+        cells = [line]
+        if not _is_content(line):
+            cells = []
+        elif mark == BLANKS:
+            cells = line.split()
+        elif mark != _WHOLE:
+            line = line.replace("\r", " ")
+            reader = csv.reader([line], delimiter=mark, skipinitialspace=mark != "\t")
+            cells = next(reader, [])
         rows.append([cell.strip() for cell in cells])
     return rows
 
 
-def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | None:
-    """Finds names and data among the first rows, or None if the rows have no common number of cells."""
+def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None:
+    """Finds names and data among the first lines, or None if they have no common number of
+    cells.
+    """
+    rows = _split(lines, mark)
     filled = [row for row in rows if row]
-    last = filled[len(filled) // 2 :]
+    last = filled[2 * len(filled) // 3 :]
     widths = [len(row) for row in last]
-    width = max(set(widths), key=lambda each: (widths.count(each), each))
+    width = max(widths, key=lambda number: (widths.count(number), number))
     if widths.count(width) < 0.6 * len(widths):
         return None
     sample = [row for row in last if len(row) == width]
-    counts = [str(number) for number in range(width)]
     solid = [place for place in range(min(width, _LOOK)) if _is_solid(sample, place)]
 
     def share(row: list[str]) -> float:
-        """Share of the columns of numbers and dates that hold one in this row, none if its cells are names that count, as in `,0,1`."""
-        if (
-            len(row) > 1
-            and row[1:] in (counts[: len(row) - 1], counts[1 : len(row)])
-            and not _SOLID.match(row[0])
-        ):
+        """Share of the columns of numbers and dates that hold one in this row, none if its cells
+        are names that count, as in `,0,1`, or formats, as `5s` and `20d` of the USGS.
+        """
+        if row and all(map(_FORMAT, row)):
             return 0.0
-        return sum(place < len(row) and bool(_SOLID.match(row[place])) for place in solid) / max(
-            1, len(solid)
-        )
+        first, *others = row or [""]
+        counts = [str(number) for number in range(len(row))]
+        if others and others in (counts[:-1], counts[1:]) and not _SOLID.match(first):
+            return 0.0
+        marks = [place < len(row) and bool(_SOLID.match(row[place])) for place in solid]
+        return sum(marks) / max(1, len(solid))
 
     begin = next(
         (number for number, row in enumerate(rows) if len(row) == width and share(row) > 0.5), None
     )
     if begin is None:  # words only
-        begin = next(number for number, row in enumerate(rows) if row) + (not no_header)
+        begin = rows.index(filled[0]) + (not no_header)
     while begin > 0 and len(rows[begin - 1]) == width and share(rows[begin - 1]) > 0:
         begin -= 1
-    if (
-        begin > 0 and len(rows[begin - 1]) == width + 1 and share(rows[begin - 1]) == 0
-    ):  # of a last column that is mostly left out
-        width += 1
-    block = next(
-        (number for number in range(begin, 0, -1) if rows[number - 1]), 0
-    )  # a blank line may follow the names
-    block = block if block and len(rows[block - 1]) == width else begin
-    top = block
+    # of a last column that is mostly left out
+    lacks = begin > 0 and len(rows[begin - 1]) == width + 1 and share(rows[begin - 1]) == 0
+    width += lacks
+    # a blank line may follow the names
+    top = next((number for number in range(begin, 0, -1) if rows[number - 1]), 0)
+    top = top if top and len(rows[top - 1]) == width else begin
+    block = top
     while (
         block > 0
-        and rows[block - 1]
-        and len(rows[block - 1]) <= width
+        and 0 < len(rows[block - 1]) <= width
         and (share(rows[block - 1]) == 0 or len(rows) == 1)
     ):
         block -= 1
-    names, units, skipped = [""] * width, [], sum(bool(row) for row in rows[:begin])
+    names = [""] * width
+    units = []
+    if block < top and no_header:
+        begin = block
+    skipped = sum(map(bool, rows[:begin]))
     if block < top and not no_header:
-        header = max(
-            range(block, top),
-            key=lambda number: (len({cell for cell in rows[number] if cell}), -number),
-        )
+        # the line of the most different names, of several the first
+        header = max(range(block, top), key=lambda number: len({*rows[number]} - {""}))
         given = rows[header]
-        if (
-            mark == BLANKS and 1 < len(given) == width - 1 and ":" in rows[begin][1]
-        ):  # a date and a time of day below one name
+        # a date and a time of day below one name
+        if mark == BLANKS and 1 < len(given) == width - 1 and ":" in rows[begin][1]:
             given = ["", *given]
-        short = width - len(given)
-        if short and any(row[len(given) :] != [""] * short for row in sample):
+        if any(any(row[len(given) :]) for row in sample):
             return None
-        names, skipped = [*given, *[""] * short], skipped - 1
+        names = given + names[len(given) :]
+        skipped -= 1
         if not any(names):
             return None
-        others = [rows[number] for number in range(block, top) if number != header]
-        for place in [
-            place for place, name in enumerate(names) if not name
-        ]:  # names in two lines, as under merged cells
-            names[place] = next(
-                (row[place] for row in others if place < len(row) and row[place]), ""
-            )
+        # names in two lines, as under merged cells
+        for row in rows[block:header] + rows[header + 1 : top]:
+            row = row + names[len(row) :]
+            names = [name or other for name, other in zip(names, row, strict=True)]
         units = rows[header + 1] if header + 1 < top else []
-    elif block < top and no_header:
-        begin, skipped = block, sum(bool(row) for row in rows[:block])
-    return Dialect(mark, names, begin, skipped, [row for row in rows[begin:] if row], units)
+    head = [row for row in rows[begin:] if row]
+    mark = "," if mark == _WHOLE else mark
+    return Dialect(mark, names, begin, skipped, head, units, lacks or not names[-1])
 
 
 def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
@@ -206,9 +229,11 @@ def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
 
 
 def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
-    """Returns the dialect with names from the last comment above the data, as NumPy writes them, or None if it has not as many.
+    """Returns the dialect with names from the last comment above the data, as NumPy writes them, or
+    None if it has not as many.
 
-    If that repeats a name, it holds units, as in files of weather buoys, and the comment before it the names.
+    If that repeats a name, it holds units, as in files of weather buoys, and the comment before it
+    the names.
     """
     comments = [
         line.lstrip("#%").strip()
@@ -224,7 +249,8 @@ def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
         [name.strip() for name in re.split(mark, comment)] for comment in comments[-2:]
     )
     if before and len(before[0]) == len(names) == len(set(before[0])) > len(set(names)):
-        found, names = dataclasses.replace(found, units=names), before[0]
+        found = dataclasses.replace(found, units=names)
+        names = before[0]
     if (
         len(names) != len(found.names)
         or not all(names[1:])

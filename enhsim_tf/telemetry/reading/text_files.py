@@ -1,16 +1,21 @@
-"""Reads text files as tables: one decision on the decimal sign from all columns, and messages with the lines of the file."""
+"""Reads text files as tables: one decision on the decimal sign from all columns, and messages with
+the lines of the file.
+"""
 
+import contextlib
+import csv
 import dataclasses
 import io
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import (
+    SIGNS,
     allows_point_thousands,
     has_commas,
     is_text,
@@ -20,8 +25,16 @@ from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import ROWS, Finding, Places
 from enhsim_tf.telemetry.reading.dialect import BLANKS, Dialect, decode, find_dialect
 
+_HEAD = 100_000  # bytes that are searched for blanks before cells
 _LOOK = 2_000  # cells of a column that are searched for a decimal comma
+# plain ones, which pandas reads faster than text; other cells in their column leave it text
+_TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d").match
 _ANNOTATION = re.compile(r"^#(?:group|datatype|default)\b", re.MULTILINE)
+_ANNOTATED = re.compile(r"((?:^#.*\n)+)((?:^(?!#).*\n?)*)", re.MULTILINE)
+
+
+class _RaggedError(ValueError):
+    """Raised for lines of different lengths."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -32,9 +45,8 @@ class Table:
     places: Places = ROWS  # where the rows are in their files
     decimal: str | None = None  # sign of numbers in text; None: each column shows its own
     findings: tuple[Finding, ...] = ()  # for the cleaning log
-    units: Mapping[str, str] = dataclasses.field(
-        default_factory=dict
-    )  # cells of a line of units by column
+    # cells of a line of units by column
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 def table_of(
@@ -43,23 +55,33 @@ def table_of(
     name: str,
     decimal: str | None,
     findings: Sequence[Finding],
+    skipped: int = 0,
 ) -> Table:
-    """Makes a table of the cells below the header of a file."""
+    """Makes a table of the cells below the header of a file, above which lines were skipped."""
     frame.columns = dialect.names
     units = dict(zip(dialect.names, dialect.units, strict=False))
     return Table(
-        frame, Places([(0, dialect.first_line + 1, name)]), decimal, tuple(findings), units
+        frame,
+        Places(((0, dialect.first_line + skipped + 1, name),)),
+        decimal,
+        tuple(findings),
+        units,
     )
 
 
 def read_text(content: bytes, name: str, options: Cleaning) -> Table:
-    """Reads the content of a text file. Every line behind the header is a row; blank lines are rows of missing values.
+    """Reads the content of a text file. Every line behind the header is a row; blank lines are rows
+    of missing values.
 
     Raises:
         InputError: If it has no header, or its decimal sign cannot be told.
         ValueError: If it cannot be read. The message says why.
     """
     text, findings = decode(content)
+    if options.skip_rows:
+        text = "".join(text.split("\n", options.skip_rows)[options.skip_rows :])
+        if not text.strip():
+            raise ValueError(f"no line is left behind skip_rows={options.skip_rows}")
     if _ANNOTATION.search(text[:10_000]):
         return _read_annotated(text, name, findings)
     dialect = find_dialect(text, name, options.no_header)
@@ -71,8 +93,21 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 f"lines before the data that were skipped: {dialect.skipped:,}",
             )
         )
-    data = "".join(text.split("\n", dialect.first_line)[dialect.first_line :])
-    frame, decimal = _read_rows(data, dialect, name, options.decimal)
+    data = b"".join(text.encode().split(b"\n", dialect.first_line)[dialect.first_line :])
+    if not data or data.isspace():
+        raise InputError(
+            f"Expected rows below the header. Received: only names in {name}, "
+            f"{', '.join(dialect.names[:4])}. Give a file with values."
+        )
+    above = dialect.first_line + options.skip_rows
+    frame = None
+    with contextlib.suppress(_RaggedError):
+        frame, decimal = _read_rows(data, dialect, name, options.decimal)
+    if frame is None or _may_be_ragged(frame, data, dialect):
+        data, ragged = _without_ragged(data, dialect, above, name, options.drop_bad)
+        findings += ragged
+        if ragged or frame is None:
+            frame, decimal = _read_rows(data, dialect, name, options.decimal)
     if decimal == ",":
         findings.append(
             Finding(
@@ -85,22 +120,78 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     if repeated:
         frame = frame.astype(object)
         frame.iloc[repeated] = None
-        lines = ", ".join(str(row + dialect.first_line + 1) for row in repeated[:3])
+        lines = ", ".join(str(row + above + 1) for row in repeated[:3])
         findings.append(
             Finding(
                 "header lines",
                 len(repeated),
-                f"lines that repeat the header or mark a stop, left out: {len(repeated):,} (line {lines})",
+                f"lines that repeat the header or mark a stop, left out: {len(repeated):,} (line "
+                f"{lines})",
             )
         )
-    return table_of(frame, dialect, name, decimal, findings)
+    return table_of(frame, dialect, name, decimal, findings, options.skip_rows)
+
+
+def _may_be_ragged(frame: pd.DataFrame, data: bytes, dialect: Dialect) -> bool:
+    """Whether lines that were read may have fewer cells than the header: then some of the last
+    column are missing, and so are separators, which can be counted unless cells hold them.
+    """
+    num_separators = (len(dialect.names) - 1) * len(frame)
+    return bool(frame.iloc[:, -1].isna().any()) and (
+        b'"' in data or data.count(dialect.separator.encode()) != num_separators
+    )
+
+
+def _without_ragged(
+    data: bytes, dialect: Dialect, above: int, name: str, drop: bool
+) -> tuple[bytes, list[Finding]]:
+    """Empties lines that have another number of cells than the header, if they are to be dropped,
+    or if it is the last, without an end; otherwise refuses them.
+    """
+    width = len(dialect.names)
+    lines = data.decode().split("\n")
+    if dialect.separator == BLANKS:
+        rows = ((number, number + 1, len(line.split())) for number, line in enumerate(lines))
+    else:
+        rows = _rows_of(lines, dialect.separator)
+    whole = (0, width, width - dialect.may_lack_last)
+    wrong = [row for row in rows if row[2] not in whole]
+    if not wrong or width == 1:
+        return data, []
+    is_cut = wrong[-1][0] == len(lines) - 1 and wrong[-1][2] < width
+    if len(wrong) > is_cut and not drop:
+        first, _, cells = wrong[0]
+        raise InputError(
+            f"Expected {width} cells in a line, as in the header. Received: line "
+            f"{first + above + 1} has {cells}, in {name} ({len(wrong):,} such lines in all).",
+            [{"drop_bad": True}],
+            "a corrected file",
+        )
+    for begin, end, _ in wrong:
+        lines[begin:end] = [""] * (end - begin)
+    where = tuple(f"line {begin + above + 1}" for begin, _, _ in wrong[:3])
+    text = f"lines with another number of cells than the header: {len(wrong):,}"
+    if is_cut:
+        text += "; the last line is cut off"
+    return "\n".join(lines).encode(), [Finding("ragged lines", len(wrong), text, where)]
+
+
+def _rows_of(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, int]]:
+    """Yields first line, end and number of cells of each row."""
+    begin = 0
+    rows = csv.reader((line.strip(" \r") for line in lines), delimiter=separator)
+    for cells in rows:
+        yield begin, rows.line_num, len(cells)
+        begin = rows.line_num
 
 
 def _read_rows(
-    data: str, dialect: Dialect, name: str, decimal: str | None
+    data: bytes, dialect: Dialect, name: str, decimal: str | None
 ) -> tuple[pd.DataFrame, str | None]:
     """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
     names = dialect.names
+    if dialect.separator == "," and b'"' not in data:
+        return _parse(data, dialect, name, decimal), decimal  # no cell has a comma
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
     sign = decimal or ("," if any(_shows_comma(head[column]) for column in head) else None)
     if sign is None and dialect.separator == ";":
@@ -109,7 +200,8 @@ def _read_rows(
     if sign is None and any(
         is_text(frame[column]) and _shows_comma(frame[column]) for column in frame
     ):
-        sign, frame = ",", _parse(data, dialect, name, ",")
+        sign = ","
+        frame = _parse(data, dialect, name, sign)
     if sign == "," and decimal is None:
         _check_points(frame, names, name)
     return frame, sign
@@ -120,7 +212,9 @@ def _shows_comma(cells: pd.Series) -> bool:
 
 
 def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str | None:
-    """Returns the comma where dates are written with points and all numbers with commas, as where the comma is the decimal sign."""
+    """Returns the comma where dates are written with points and all numbers with commas, as where
+    the comma is the decimal sign.
+    """
     columns = [head[column].astype("str").str.strip() for column in head]
     if not any(cells.str.fullmatch(r"\d\d?\.\d\d?\.\d{4}.*").any() for cells in columns):
         return None
@@ -133,14 +227,17 @@ def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str
         allows_point_thousands(columns[column][columns[column] != ""]) for column in pointed
     ):
         raise InputError(
-            f"Expected a decimal sign that can be told. Received: {head[pointed[0]].iloc[0]!r} in {names[pointed[0]]!r} of {name}, where a point may "
-            "separate thousands. Give decimal (--decimal . or --decimal ,)."
+            f"Expected a decimal sign that can be told. Received: {head[pointed[0]].iloc[0]!r} in "
+            f"{names[pointed[0]]!r} of {name}, where a point may separate thousands.",
+            SIGNS,
         )
     return "," if not pointed and any(has_commas(cells) for cells in columns) else None
 
 
 def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
-    """Refuses numbers with decimal points in one column of a file that has decimal commas in others."""
+    """Refuses numbers with decimal points in one column of a file that has decimal commas in
+    others.
+    """
     for column in frame:
         if not is_text(frame[column]):
             continue
@@ -150,13 +247,17 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
         points = cells[cells.str.fullmatch(r"[+-]?\d+\.\d+").to_numpy(bool)]
         if len(points) > len(cells) / 2 and not allows_point_thousands(points):
             raise InputError(
-                f"Expected one decimal sign in all columns. Received: a point in {names[column]!r} ({points.iloc[0]}), commas in others, in {name}. "
-                "Give decimal (--decimal . or --decimal ,)."
+                f"Expected one decimal sign in all columns. Received: a point in {names[column]!r} "
+                f"({points.iloc[0]}), commas in others, in {name}.",
+                SIGNS,
             )
 
 
-def _parse(data: str, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
-    width, is_blanks = len(dialect.names), dialect.separator == BLANKS
+def _parse(data: bytes, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
+    width = len(dialect.names)
+    is_blanks = dialect.separator == BLANKS
+    head = b"\n" + data[:_HEAD]
+    is_padded = b"\n " in head or f"{dialect.separator} ".encode() in head
     options = {
         "sep": dialect.separator,
         "header": None,
@@ -167,93 +268,85 @@ def _parse(data: str, dialect: Dialect, name: str, decimal: str | None) -> pd.Da
     options |= {
         "skip_blank_lines": is_blanks,
         "decimal": decimal or ".",
-        "skipinitialspace": dialect.separator != "\t",
+        # it costs a fifth of the time
+        "skipinitialspace": is_blanks or is_padded and dialect.separator != "\t",
+        "parse_dates": [
+            place
+            for row in dialect.head[:1]
+            for place, cell in enumerate(row[:width])
+            if _TIME(cell)
+        ],
+        "date_format": "ISO8601",
     }
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "error", pd.errors.ParserWarning
-        )  # otherwise lines longer than the header are cut
+        # otherwise lines longer than the header are cut
+        warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
-            frame = pd.read_csv(io.BytesIO(data.encode()), **options)
+            frame = pd.read_csv(io.BytesIO(data), **options)
         except pd.errors.EmptyDataError:
             return pd.DataFrame(columns=range(width), dtype=object)
         except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-            found = re.search(r"in line (\d+), saw (\d+)", str(error))
-            if found or isinstance(error, pd.errors.ParserWarning):
-                line, cells = found.groups() if found else (1, "more")
-                raise ValueError(
-                    f"line {int(line) + dialect.first_line} has {cells} cells, the header {width}"
-                ) from None
             is_quote = "EOF" in str(error) or "quot" in str(error)
-            raise ValueError(
+            raise _RaggedError(
                 "a quote that does not end" if is_quote else "lines that do not match the header"
             ) from None
-    if is_blanks and frame.iloc[:-1, -1].isna().any():  # the last line may be cut
-        for number, line in enumerate(data.rstrip().split("\n")[:-1], dialect.first_line + 1):
-            if 0 < len(line.split()) < width:
-                raise ValueError(f"line {number} has {len(line.split())} cells, the header {width}")
     return frame
 
 
 def _repeated_headers(frame: pd.DataFrame, names: Sequence[str]) -> list[int]:
-    """Returns the numbers of the rows that repeat the names, as in files that were joined, or that WinCC writes where it stops (`$RT_OFF$`)."""
-    first = next(
-        (place for place, name in enumerate(names) if not name.startswith("column ")), None
-    )
-    if first is None or not is_text(frame.iloc[:, first]):
+    """Returns the numbers of the rows that repeat the names, as in files that were joined, or that
+    WinCC writes where it stops (`$RT_OFF$`).
+    """
+    place = next((number for number, name in enumerate(names) if name[:7] != "column "), 0)
+    first = frame.iloc[:, place]
+    if not is_text(first):
         return []
-    is_mark = frame.iloc[:, first].astype("str").str.startswith("$RT_").fillna(False)
-    rows = np.flatnonzero((frame.iloc[:, first] == names[first]).fillna(False) | is_mark)
-    repeats = (
-        all(
+    first = first.astype("str")
+    rows = np.flatnonzero((first.str.startswith("$RT_") | (first == names[place])).fillna(False))
+    return [
+        row
+        for row in rows
+        if first.iloc[row] != names[place]
+        or all(
             str(cell).strip() in (name, "nan")
             for cell, name in zip(frame.iloc[row], names, strict=True)
         )
-        for row in rows
-    )
-    return [
-        row for row, repeated in zip(rows, repeats, strict=True) if repeated or is_mark.iloc[row]
     ]
 
 
 def _read_annotated(text: str, name: str, findings: list[Finding]) -> Table:
-    """Reads InfluxDB's annotated CSV, in which each table has annotations and a header of its own."""
-    lines = text.split("\n")
-    marks = [number for number, line in enumerate(lines) if _ANNOTATION.match(line)]
-    begins = [number for number in marks if number - 1 not in marks]
-    frames, places, row = [], [], 0
-    for begin, end in zip(begins, [*begins[1:], len(lines)], strict=True):
-        header = next(
-            (number for number in range(begin, end) if not lines[number].startswith("#")), end
-        )
-        defaults = next((line for line in lines[begin:header] if line.startswith("#default")), "")
-        data = "\n".join(line.rstrip("\r") for line in lines[header:end]).rstrip("\n")
+    """Reads InfluxDB's annotated CSV, in which each table has annotations and a header of its
+    own.
+    """
+    frames = []
+    places = []
+    row = 0
+    for block in _ANNOTATED.finditer(text):
+        annotations, data = block.groups()
         if not data.strip():
             continue
+        line = text.count("\n", 0, block.start(2))
         try:
-            frame = pd.read_csv(io.StringIO(data), low_memory=False, skip_blank_lines=False)
+            frame = pd.read_csv(
+                io.StringIO(data.rstrip()), low_memory=False, skip_blank_lines=False
+            )
         except pd.errors.ParserError:
             raise ValueError(
-                f"a table in the lines {header + 1} to {end} whose lines have different lengths"
+                f"a table behind line {line + 1} whose lines have different lengths"
             ) from None
         if "error" in frame and "reference" in frame:
-            raise ValueError(
-                f"the database answered with an error: {str(frame['error'].iloc[0] if len(frame) else '')[:100]}"
-            )
-        values = defaults.rstrip("\r").split(",")
-        for column, value in zip(frame.columns[1:], values[1:], strict=False):
+            raise ValueError(f"the database answered with an error: {frame['error'].max()!s:.100}")
+        defaults = re.search("^#default,(.*)", annotations, re.MULTILINE)
+        values = defaults[1].rstrip("\r").split(",") if defaults else []
+        for column, value in zip(frame.columns[1:], values, strict=False):
             if value:
                 frame[column] = frame[column].astype(object).fillna(value)
-        frames.append(
-            frame.iloc[:, 1:]
-            if frame.shape[1] and str(frame.columns[0]).startswith("Unnamed")
-            else frame
-        )
-        places.append((row, header + 2, name))
+        frames.append(frame.drop(columns="Unnamed: 0", errors="ignore"))
+        places.append((row, line + 2, name))
         row += len(frame)
     if not frames:
         raise ValueError("it has no table")
     findings.append(
         Finding("header lines", len(frames), f"tables of annotated CSV: {len(frames):,}")
     )
-    return Table(pd.concat(frames, ignore_index=True), Places(places), ".", tuple(findings))
+    return Table(pd.concat(frames, ignore_index=True), Places(tuple(places)), ".", tuple(findings))

@@ -28,7 +28,9 @@ VOLTS, AMPERES, CELSIUS = range(3)
 
 @pytest.fixture(scope="module")
 def pulses():
-    """Voltages and temperatures of both simulators for a current with steps, nominal and under three faults from sample 120."""
+    """Voltages and temperatures of both simulators for a current with steps, nominal and under
+    three faults from sample 120.
+    """
     current = np.where(np.arange(SHORT) % 60 < 30, 3.0, -1.0)
     faults = [
         None,
@@ -61,9 +63,8 @@ def test_added_resistance_lowers_the_voltage_by_ohms_law(pulses):
     current, runs = pulses
     for nominal, raised, *_ in runs.values():
         drop = nominal[130:150, VOLTS] - raised[130:150, VOLTS]
-        np.testing.assert_allclose(
-            drop, 0.032 * current[130:150], rtol=0.04
-        )  # its heat, which helps the kinetics, is the rest
+        # its heat, which helps the kinetics, is the rest
+        np.testing.assert_allclose(drop, 0.032 * current[130:150], rtol=0.04)
 
 
 def test_a_cell_without_current_keeps_its_voltage_and_the_temperature_around_it():

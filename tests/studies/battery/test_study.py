@@ -34,26 +34,26 @@ def _added(fault):
 @pytest.fixture(scope="module")
 def recorded():
     runs, rng = {}, np.random.default_rng(0)
-    for part, orbits in (("fit", 16), ("more", 8), ("test", 8), ("coarse", 16)):
-        runs[run_key(part, "coarse")], runs[run_key(part, "fine")] = _run(
-            draw_load(orbits + 1, GENTLE, rng)
-        )
+    loads = {
+        part: draw_load(orbits + 1, GENTLE, rng)
+        for part, orbits in (("fit", 16), ("more", 8), ("test", 8), ("coarse", 16))
+    }
+    for part, load in loads.items():
+        runs[run_key(part, "coarse")], runs[run_key(part, "fine")] = _run(load)
     load = draw_load(3, GENTLE, rng)
     for fault in (None, *ALL):
-        runs[run_key("fault", "coarse", fault)], runs[run_key("fault", "fine", fault)] = _run(
-            load, _added(fault)
+        coarse, fine = _run(load, _added(fault))
+        runs[run_key("fault", "coarse", fault)], runs[run_key("fault", "fine", fault)] = (
+            coarse,
+            fine,
         )
     return runs
 
 
 @pytest.fixture(autouse=True)
 def small_numbers(monkeypatch):
-    counts = {
-        "NUM_TEST": 80,
-        "NUM_FAULT": 10,
-        "NUM": 100,
-        "WINDOW": 100,
-    }  # few orbits are enough to learn short windows from
+    # few orbits are enough to learn short windows from
+    counts = {"NUM_TEST": 80, "NUM_FAULT": 10, "NUM": 100, "WINDOW": 100}
     for module in (detectors, record):
         for name in counts.keys() & vars(module).keys():
             monkeypatch.setattr(module, name, counts[name])
@@ -84,9 +84,8 @@ def test_the_residual_finds_the_fault_that_the_planned_run_does_not_have(recorde
         for row in judge.reference_rows()
     }
     for reference in (ENHANCED_RUN, COARSE_RUN):
-        assert (
-            rows[reference, "raised resistance", 1.0] > 0.5
-        )  # not all: the current is small where the battery is nearly full
+        # not all: the current is small where the battery is nearly full
+        assert rows[reference, "raised resistance", 1.0] > 0.5
     assert rows[ENHANCED_RUN, "nominal", 0.0] < 0.1
 
 
@@ -101,19 +100,8 @@ def test_training_and_threshold_share_no_orbit_and_are_drawn_by_the_seed(recorde
 def test_without_pybamm_the_command_says_what_to_install(monkeypatch, capsys, tmp_path):
     monkeypatch.setitem(sys.modules, "pybamm", None)
     simulate.import_pybamm.cache_clear()
-    assert (
-        command(
-            [
-                "--budget",
-                "smoke",
-                "--out",
-                str(tmp_path / "out"),
-                "--cache",
-                str(tmp_path / "cache"),
-            ]
-        )
-        == 2
-    )
+    words = f"--budget smoke --out {tmp_path}/out --cache {tmp_path}/cache"
+    assert command(words.split()) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "pip install 'enhsim_tf[battery]'" in line
     simulate.import_pybamm.cache_clear()

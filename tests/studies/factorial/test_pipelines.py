@@ -1,4 +1,6 @@
-"""The cells have the signal and the noise that their names say, and those of the study of robustness where they agree."""
+"""The cells have the signal and the noise that their names say, and those of the study of
+robustness where they agree.
+"""
 
 import argparse
 import json
@@ -15,7 +17,7 @@ from studies.factorial.summary import KEPT
 from studies.robustness.replicate import Replicate
 
 SMALL = {"paper__num_windows": 40, "second__num_windows": 90, "robustness__num_windows": 30}
-SMALL |= {"paper__iterations": 1, "paper__record_every": 1}
+SMALL |= {"paper__iterations": 2, "paper__record_every": 1}
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +34,8 @@ def test_whole_windows_of_the_residual_are_added_to_the_signal(without_networks)
     extracted = one.extracted(*cell.source)
     assert extracted.shape == (90, 500)
     for window in noise:
-        assert (
-            np.abs(extracted - window).max(axis=1).min() < 1e-5
-        )  # each is one of the extracted windows
+        # each is one of the extracted windows
+        assert np.abs(extracted - window).max(axis=1).min() < 1e-5
 
 
 def test_the_residual_is_telemetry_minus_the_signal_and_keeps_its_scale(without_networks):
@@ -43,9 +44,8 @@ def test_the_residual_is_telemetry_minus_the_signal_and_keeps_its_scale(without_
         for kind in ("residual", "moving average")
     )
     assert np.std(residual) == pytest.approx(0.1, rel=0.1)  # the noise of the example telemetry
-    assert np.std(averaged) == pytest.approx(
-        0.1 * np.sqrt(1 - 1 / 25), rel=0.05
-    )  # what a moving average of 25 samples leaves
+    # what a moving average of 25 samples leaves
+    assert np.std(averaged) == pytest.approx(0.1 * np.sqrt(1 - 1 / 25), rel=0.05)
 
 
 def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable(without_networks):
@@ -63,16 +63,8 @@ def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable
 def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_path, monkeypatch):
     def judged(self, cell):
         alarms = {"coarse": 50, "real": 1}.get(cell, 9)
-        return [
-            {
-                "detector": name,
-                "alarms": alarms,
-                "windows": 59,
-                "recall": 0.5,
-                "recall_at_real_rate": 0.25,
-            }
-            for name in DETECTORS
-        ]
+        row = {"alarms": alarms, "windows": 59, "recall": 0.5, "recall_at_real_rate": 0.25}
+        return [row | {"detector": name} for name in DETECTORS]
 
     monkeypatch.setattr(Pipelines, "judged", judged)
     options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
@@ -98,7 +90,5 @@ def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_co
         (Cell("many", "residual", "network", "autoregression"), one.second_network),
     ):
         rng = np.random.default_rng(int(one.example.draw(TRAINING).integers(2**31)))
-        assert np.array_equal(
-            one.arm(cell, TRAINING),
-            enhance(coarse) + one.generator(cell).generate(len(coarse), rng).reshape(coarse.shape),
-        )
+        noise = one.generator(cell).generate(len(coarse), rng).reshape(coarse.shape)
+        assert np.array_equal(one.arm(cell, TRAINING), enhance(coarse) + noise)

@@ -1,10 +1,12 @@
-"""The study of few windows: training data have the properties that they are named for, and the rules are those of the text."""
+"""The study of few windows: training data have the properties that they are named for, and the
+rules are those of the text.
+"""
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.telemetry.series import Telemetry
 from studies.common.settings import make_settings
 from studies.few_windows import summary
@@ -13,12 +15,11 @@ from studies.few_windows.record import REAL, SIMULATOR, Record, coral_alignment
 
 
 def test_the_simulator_of_a_record_generates_its_signal_and_its_noise():
-    values = np.sin(2 * np.pi * np.arange(3_000) / 40) + 0.2 * np.random.default_rng(
-        0
-    ).standard_normal(3_000)
+    noise = 0.2 * np.random.default_rng(0).standard_normal(3_000)
+    values = np.sin(2 * np.pi * np.arange(3_000) / 40) + noise
     coarse = SquareWaveSimulator([SquareWave(40.0, low=-1.0, high=1.0)])
     record, again = (
-        Record(Telemetry(values.astype(np.float32)), coarse, 50, 300, 0) for _ in range(2)
+        Record(Telemetry.of(values.astype(np.float32)), coarse, 50, 300, 0) for _ in range(2)
     )
     noise, clean = record.residuals
     assert noise.std() == pytest.approx(0.2, rel=0.1)
@@ -41,18 +42,14 @@ def test_aligned_windows_have_the_mean_and_the_covariance_of_the_target():
 
 
 def test_the_record_ends_before_the_judged_windows():
-    world = World(
-        make_settings(
-            "smoke", paper__seed=3, few_windows__num_real=(5, 20), few_windows__num_judged=8
-        )
-    )
+    counts = {"few_windows__num_real": (5, 20), "few_windows__num_judged": 8}
+    world = World(make_settings("smoke", paper__seed=3, **counts))
     few, many = world.record(5), world.record(20)
     np.testing.assert_array_equal(few.telemetry.values, many.telemetry.values[-5 * world.window :])
     assert few.telemetry.offset_s == 15 * world.window
     first = world.judged["nominal"][0]
-    np.testing.assert_array_equal(
-        first, world.values[21 * world.window : 22 * world.window]
-    )  # a gap of one window
+    # a gap of one window
+    np.testing.assert_array_equal(first, world.values[21 * world.window : 22 * world.window])
 
 
 @pytest.mark.parametrize(("recall", "pays"), [(0.6, [5]), (0.58, [5]), (0.56, [])])
@@ -74,7 +71,6 @@ def test_a_simulator_pays_where_it_halves_the_excess_without_losing_recall(recal
         for number, rate in by_number.items()
     ]
     found = summary.summarise({"rows": pd.DataFrame(rows)})["environments"]["white"]
-    assert found["pays"] == {
-        SIMULATOR + "gaussian": pays
-    }  # five points of ten; 1.1 of 2; and from 100 on the real windows suffice
+    # five points of ten; 1.1 of 2; and from 100 on the real windows suffice
+    assert found["pays"] == {SIMULATOR + "gaussian": pays}
     assert found["real_suffices_from"] == 100

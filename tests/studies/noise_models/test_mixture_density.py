@@ -12,13 +12,9 @@ pytestmark = pytest.mark.slow
 WINDOW = 32
 
 
-def _windows(series: np.ndarray) -> np.ndarray:
-    return series.reshape(-1, WINDOW)
-
-
 def test_an_autoregression_is_recovered():
     rng = np.random.default_rng(0)
-    noise = _windows(lfilter([0.3], [1.0, -0.7], rng.standard_normal(800 * WINDOW)))
+    noise = lfilter([0.3], [1.0, -0.7], rng.standard_normal(800 * WINDOW)).reshape(-1, WINDOW)
     model = MixtureDensityNoise(seed=1, num_steps=100).fit(noise)
     generated = model.generate(800, rng)
     assert generated.shape == (800, WINDOW)
@@ -32,7 +28,7 @@ def test_an_autoregression_is_recovered():
 
 def test_noise_that_grows_with_the_signal_is_recovered():
     rng = np.random.default_rng(2)
-    signal = _windows(np.sin(2 * np.pi * np.arange(800 * WINDOW) / 50))
+    signal = np.sin(2 * np.pi * np.arange(800 * WINDOW) / 50).reshape(-1, WINDOW)
     model = MixtureDensityNoise(seed=3, num_steps=200).fit(
         (1 + 0.5 * signal) * rng.standard_normal(signal.shape), signal
     )
@@ -43,6 +39,6 @@ def test_noise_that_grows_with_the_signal_is_recovered():
 
 def test_quantised_noise_keeps_its_levels():
     rng = np.random.default_rng(4)
-    noise = _windows(0.5 * np.rint(rng.standard_normal(200 * WINDOW) / 0.5))
+    noise = 0.5 * np.rint(rng.standard_normal((200, WINDOW)) / 0.5)
     generated = MixtureDensityNoise(seed=5, num_steps=20).fit(noise).generate(50, rng)
     np.testing.assert_allclose(generated, 0.5 * np.rint(generated / 0.5), atol=1e-6)

@@ -1,4 +1,6 @@
-"""Each measure sees what it is there to see, is blind to what it cannot see, and lets real noise pass."""
+"""Each measure sees what it is there to see, is blind to what it cannot see, and lets real noise
+pass.
+"""
 
 import numpy as np
 import pytest
@@ -12,11 +14,12 @@ NAMES = [measure.name for measure in MEASURES]
 
 
 def process(seed, num_windows=200, samples=500):
-    """Noise with memory (AR(1), 0.7), heavy tails (Student's t with 5 degrees of freedom) and a scale that differs between windows."""
+    """Noise with memory (AR(1), 0.7), heavy tails (Student's t with 5 degrees of freedom) and a
+    scale that differs between windows.
+    """
     rng = np.random.default_rng(seed)
-    values = lfilter([1.0], [1.0, -0.7], rng.standard_t(5, (num_windows, samples + 100)), axis=1)[
-        :, 100:
-    ]
+    draws = rng.standard_t(5, (num_windows, samples + 100))
+    values = lfilter([1.0], [1.0, -0.7], draws, axis=1)[:, 100:]
     return (np.exp(0.3 * rng.standard_normal((num_windows, 1))) * values).astype(np.float32)
 
 
@@ -67,20 +70,16 @@ def test_a_control_is_seen_by_those_that_can_and_by_no_other_and_real_noise_by_n
 
 
 def test_floors_are_real_against_real(monkeypatch):
-    monkeypatch.setattr(
-        real_floor, "_BLOCK", 1
-    )  # the mean of a re-split's difference is that of two halves drawn at random
+    # the mean of a re-split's difference is that of two halves drawn at random
+    monkeypatch.setattr(real_floor, "_BLOCK", 1)
     real, again = process(1, 40, 100), process(2, 40, 100)
     (measure,) = [measure for measure in MEASURES if measure.name == "scale difference"]
     found = RealFloor(real, again, 200, measures=[measure])
-    owner, by_hand = np.random.default_rng(9), []
-    for _ in range(200):
-        order = owner.permutation(80)
-        by_hand.append(
-            fidelity.scale_difference(
-                *(np.concatenate([real, again])[half] for half in (order[:40], order[40:]))
-            )
-        )
+    owner, windows = np.random.default_rng(9), np.concatenate([real, again])
+    orders = [owner.permutation(80) for _ in range(200)]
+    by_hand = [
+        fidelity.scale_difference(windows[order[:40]], windows[order[40:]]) for order in orders
+    ]
     mean = np.mean(np.abs(by_hand))
     assert found.departures == {
         "scale difference": pytest.approx(mean, abs=5 * np.std(by_hand) * np.sqrt(2 / 200))

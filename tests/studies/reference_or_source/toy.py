@@ -1,4 +1,6 @@
-"""A system whose truth is known in closed form: two channels that follow a command, one twice as strongly in reality as in the simulator."""
+"""A system whose truth is known in closed form: two channels that follow a command, one twice as
+strongly in reality as in the simulator.
+"""
 
 import dataclasses
 
@@ -12,7 +14,7 @@ class Offset:
 
 
 class Toy:
-    name, channels, interval_s = "toy", ("first", "second"), 1.0
+    name, channels, interval_s, is_continuous = "toy", ("first", "second"), 1.0, False
     unit_samples, window, onset = 200, 20, 50
     simulators = {"own": 2.0, "wrong physics": 1.0}
     faults = (Offset("offset", 0.5), Offset("offset", 1.0), Offset("silence", 1.0))
@@ -27,7 +29,7 @@ class Toy:
         values = values.copy()
         inside = np.arange(len(values)) % self.unit_samples >= self.onset
         if fault is not None and fault.kind == "offset":
-            values[inside, 0] += fault.severity
+            values[inside] += fault.severity * np.array([2.0, -1.0])  # like a command
         return values.astype(np.float32)
 
     def run_real(self, commands, faults=(None,), rng=None):
@@ -44,8 +46,8 @@ class Toy:
             for fault in faults
         ]
 
-    def can_simulate(self, simulator, kind):
-        return kind == "offset"
+    def as_inputs(self, commands):
+        return commands
 
     def measure(self, values, rng, scale=1.0):
         common = rng.standard_normal((len(values), 1))  # noise that the channels share

@@ -45,9 +45,8 @@ def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise_on_windows_t
     for purpose in ("arms, training", "arms, threshold"):
         arms = replicate.arms(purpose)
         assert list(arms) == list(ARMS)
-        assert {len(windows) for windows in arms.values()} == {
-            make_settings("smoke").robustness.num_windows
-        }
+        number = make_settings("smoke").robustness.num_windows
+        assert {len(windows) for windows in arms.values()} == {number}
         added = {
             name: np.unique((windows - arms["coarse"]).round(9)).tolist()
             for name, windows in arms.items()
@@ -62,9 +61,5 @@ def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise_on_windows_t
             ARM: [2_020],
         }
     purposes = replicate.example.purposes
-    assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == [
-        "train",
-        "train",
-        "train",
-        "calibration",
-    ]
+    assert len(set(purposes)) == 4
+    assert [part for part, _ in purposes] == ["train", "train", "train", "calibration"]

@@ -1,0 +1,246 @@
+"""The kinds of files that hold tables: one function that reads each, and one line in `READERS`.
+
+A reader takes the content of a file, its name and the options of reading, and returns a `Table`. To
+add a kind of file, write a reader and add its line.
+"""
+
+import io
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.read_errors import reading
+from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.cleaning.report import Finding
+from enhsim_tf.telemetry.reading.dialect import find_dialect
+from enhsim_tf.telemetry.reading.text_files import Table, read_text, table_of
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_MATLAB = b"MATLAB 7.3"
+_OF_JSON = (
+    "the list inside alone; of Prometheus, pandas.DataFrame(json.load(open(file))['data']['result']"
+    "[0]['values'], columns=['time', 'value'], dtype=float)"
+)
+# texts of other forms by how they begin: what they are, and what to give instead
+_FOREIGN = {
+    rb"Linux \S+ \(": ("the text of sar", "the output of sadf -d, which is a table of the same"),
+    rb"\d\d:\d\d:\d\d\.\d+ -> ": (
+        "a log of a serial monitor",
+        "the lines with a comma instead of ' -> ', only numbers behind it and names on top",
+    ),
+}
+_FEWEST_ROWS = 3  # with numbers, below which a sheet is no telemetry
+
+
+def read_parquet(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads a Parquet file."""
+    with reading(name, pa.ArrowException):
+        return Table(pd.read_parquet(io.BytesIO(content)))
+
+
+def read_json(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads JSON lines, one record each, or one list of records; what is inside of others is named
+    `outer.inner`.
+    """
+    with reading(name):
+        text = content.decode("utf-8-sig").strip()
+        is_whole = text.startswith(("[", "{\n", "{\r"))
+        lines = [text] if is_whole else text.splitlines()
+        records = [json.loads(line) for line in lines if line.strip()]
+    if len(records) == 1 and isinstance(records[0], dict):
+        names = ", ".join(records[0])
+        raise InputError(
+            f"Expected records, one in each line, or a list of them. Received: one record in "
+            f"{name}, of {names:.80}.",
+            otherwise=_OF_JSON,
+        )
+    with reading(name):
+        return Table(pd.json_normalize(records[0] if is_whole else records))
+
+
+def read_excel(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads a sheet of a workbook, with the same search for its header as in text."""
+    try:
+        import openpyxl
+    except ImportError:
+        raise InputError(
+            f"Expected the package openpyxl for {name}. Received: none. Install it, or save the "
+            "sheet as CSV."
+        ) from None
+    with reading(name):
+        book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+        sheets = {
+            sheet.title: [list(row) for row in sheet.iter_rows(values_only=True)]
+            for sheet in book.worksheets
+        }
+    usable = {title: rows for title, rows in sheets.items() if _num_numeric(rows) >= _FEWEST_ROWS}
+    first, *others = sheets
+    findings = []
+    if options.table is None and (first in usable or not usable):
+        title = first
+        if others:
+            text = f"only the first sheet was read: {first}"
+            others = [title for title in others if title in usable]
+            text += f"; give --table for another: {', '.join(others)}" if others else ""
+            findings.append(Finding("files", 1, text))
+    else:
+        title = chosen_table(usable if options.table is None else sheets, name, options, first)
+    rows = sheets[title][options.skip_rows :]
+    width = max(
+        (place + 1 for row in rows for place, cell in enumerate(row) if cell is not None), default=0
+    )
+    frame = pd.DataFrame([row[:width] for row in rows], dtype=object)
+    head = frame.head(100).replace(r"\s", " ", regex=True)
+    text = head.to_csv(sep="\t", header=False, index=False)
+    dialect = find_dialect(text, name, options.no_header, "\t")
+    frame = frame.iloc[dialect.first_line :].reset_index(drop=True).infer_objects()
+    return table_of(frame, dialect, name, None, findings, options.skip_rows)
+
+
+def _num_numeric(rows: Sequence[Sequence[Any]]) -> int:
+    """Returns the number of rows that hold a number."""
+    return sum(
+        any(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in row)
+        for row in rows
+    )
+
+
+def read_matlab(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads a MATLAB file: its vectors and matrices, or one of its structs."""
+    if content.startswith(_MATLAB):
+        return read_hdf5(content, name, options)
+    import scipy.io
+
+    with reading(name, scipy.io.matlab.MatReadError):
+        variables = scipy.io.loadmat(io.BytesIO(content), simplify_cells=True)
+    arrays = {}
+    for key, value in variables.items():
+        if isinstance(value, dict):
+            arrays |= {(key, field): np.asarray(inside) for field, inside in value.items()}
+        elif not key.startswith("__"):
+            arrays["", key] = np.asarray(value)
+    return _of_arrays(arrays, name, options)
+
+
+def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads the data sets of a group of an HDF5 file, or one of records."""
+    import h5py
+
+    arrays: dict[tuple[str, str], np.ndarray] = {}
+
+    def add(path: str, item: Any) -> None:
+        if not isinstance(item, h5py.Dataset) or item.attrs.get("MATLAB_class") == b"char":
+            return
+        parent, _, key = path.rpartition("/")
+        values = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
+        if values.dtype.names:
+            arrays.update({(path, field): values[field] for field in values.dtype.names})
+        else:  # MATLAB's axes are in reverse order
+            arrays[parent, key] = values.T if content.startswith(_MATLAB) else values
+
+    with reading(name), h5py.File(io.BytesIO(content)) as file:
+        file.visititems(add)
+    return _of_arrays(arrays, name, options)
+
+
+def _of_arrays(arrays: Mapping[tuple[str, str], np.ndarray], name: str, options: Cleaning) -> Table:
+    """Makes a table of the arrays of one group that have one length, by their group and name."""
+    tables: dict[tuple[str, int], dict[str, Any]] = {}
+    for (group, key), values in arrays.items():
+        values = np.squeeze(values)
+        if values.ndim not in (1, 2) or len(values) < 2 or values.dtype.kind not in "fiubUOM":
+            continue
+        columns = tables.setdefault((group, len(values)), {})
+        if values.ndim == 1:
+            columns[key] = values
+        else:
+            refuse_channels_first(values, f"{key} of {name}")
+            columns |= {f"{key}.{number}": column for number, column in enumerate(values.T)}
+    if not tables:
+        raise InputError(
+            f"Expected vectors or matrices of numbers. Received: none in {name}. Save them as "
+            "variables of their own, or as CSV."
+        )
+    lengths = [group for group, _ in tables]
+    named = {
+        group if group and lengths.count(group) == 1 else next(iter(columns)): columns
+        for (group, _), columns in tables.items()
+    }
+    chosen = named[chosen_table(named, name, options)]
+    return Table(pd.DataFrame({key: pd.Series(values) for key, values in chosen.items()}))
+
+
+def refuse_channels_first(values: np.ndarray, what: str) -> None:
+    """Refuses a matrix that seems to have a channel in each row."""
+    rows, columns = values.shape
+    if rows <= 64 and columns >= 10 * rows and columns >= 100:
+        raise InputError(
+            f"Expected samples in rows, channels in columns. Received: shape {values.shape} in "
+            f"{what}, which seems to have channels first. Save it transposed (array.T)."
+        )
+
+
+def chosen_table(
+    tables: Mapping[str, Any], name: str, options: Cleaning, first: str | None = None
+) -> str:
+    """Returns the name of the table that is asked for, or of the only one."""
+    if options.table in tables:
+        return options.table
+    if options.table is None and len(tables) == 1 and first is None:
+        return next(iter(tables))
+    received = f"{len(tables)} in {name}" if options.table is None else repr(options.table)
+    if first is not None and options.table is None:
+        received = f"no numbers in the first sheet of {name}, {first}"
+    raise InputError(
+        f"Expected one table. Received: {received}.", [{"table": each} for each in tables]
+    )
+
+
+READERS: dict[str, Callable[[bytes, str, Cleaning], Table]] = {
+    ".parquet": read_parquet,
+    ".xlsx": read_excel,
+    ".xlsm": read_excel,
+    ".mat": read_matlab,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".jsonl": read_json,
+    ".ndjson": read_json,
+    ".json": read_json,
+}
+"""The readers by the endings of files; those of all others are text."""
+HAS_TABLES = (".xlsx", ".xlsm", ".mat", ".h5", ".hdf5")
+"""Endings of files that may hold several tables."""
+CONVERT = {
+    ".mf4": "asammdf",
+    ".mdf": "asammdf",
+    ".tdms": "npTDMS",
+    ".ulg": "pyulog",
+    ".bag": "rosbags",
+    ".xls": "a spreadsheet program, as .xlsx",
+    ".npz": "numpy.load, as .npy",
+}
+"""What reads files that are not read here."""
+
+
+def read_any_text(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads text, and refuses other content with a line that says how to convert it."""
+    for pattern, (form, otherwise) in _FOREIGN.items():
+        if re.match(pattern, content):
+            raise InputError(f"Expected a table. Received: {form}, {name}.", (), otherwise)
+    try:
+        return read_text(content, name, options)
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        ending = "." + name.rpartition(".")[2].lower()
+        tool = CONVERT.get(ending, "the program that wrote it")
+        raise InputError(
+            f"Expected a table. Received: {name}, which cannot be read ({error}). Convert it with "
+            f"{tool}, to CSV or a DataFrame, or save it again."
+        ) from None

@@ -1,0 +1,50 @@
+"""What can be a source of telemetry, for help and messages, and whether it exists. This module
+imports nothing slow, as the command line uses it.
+"""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from enhsim_tf.common.errors import InputError
+
+PACKED = (".gz", ".zip")
+"""Endings of packed files, each with one table inside."""
+SOURCES = (
+    "a text file with a table, a .parquet, .xlsx, .mat, .h5, .jsonl or .npy file, also in .gz or "
+    ".zip, several files of one table, a folder of them, or "
+    "influxdb://bucket/measurement/field?tag=value"
+)
+"""All sources as text, for help and messages."""
+
+
+def existing(source: str | os.PathLike | Sequence[str | os.PathLike]) -> str | Path | list[Path]:
+    """Returns a source as a path, several tables as their paths, or an address of InfluxDB; raises
+    InputError unless files exist.
+    """
+    if isinstance(source, str | os.PathLike):
+        source = os.fspath(source)
+        if source.startswith("influxdb://"):
+            return source
+        # unlike Path.exists, this does not raise for names that no file can have
+        if not os.path.exists(source):
+            raise InputError(
+                f"Expected a source of telemetry. Received: {source}, which does not exist. Give "
+                f"{SOURCES}."
+            )
+        return Path(source)
+    if not isinstance(source, list | tuple):
+        raise InputError(
+            f"Expected a source of telemetry. Received: {type(source).__name__}. Give {SOURCES}; "
+            "in Python also a DataFrame or a Series, or Telemetry.of an array."
+        )
+    paths = [
+        Path(os.fspath(each)) if isinstance(each, str | os.PathLike) else None for each in source
+    ]
+    if not paths or None in paths or not all(map(os.path.isfile, paths)):
+        wrong = next((path for path in paths if path is None or not os.path.isfile(path)), None)
+        raise InputError(
+            "Expected files that exist, as several sources are files of one table. Received: "
+            f"{wrong or type(next(iter(source), source)).__name__}. Give one source."
+        )
+    return paths

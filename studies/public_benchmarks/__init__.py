@@ -1,0 +1,3 @@
+"""Study: the views of `score` on public telemetry with labels, beside what users would pick
+instead.
+"""

@@ -1,1 +1,0 @@
-"""The study of real spacecraft telemetry with labelled anomalies."""

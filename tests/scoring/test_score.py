@@ -1,0 +1,240 @@
+import copy
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.scoring.events import Event
+from enhsim_tf.scoring.options import ScoreOptions
+from enhsim_tf.scoring.score import (
+    ScoredTelemetry,
+    events_table,
+    score,
+    scorer_of,
+    write_scores,
+)
+from enhsim_tf.telemetry.joining import join_channels
+from enhsim_tf.telemetry.series import Clock, Part
+from tests.fitted_simulators import coarse_run, joint, series
+from tests.known_simulators import of_waves, parts_of
+
+
+def changed(recording, begin, end, by, channel=0):
+    values = recording.parts[0].values.copy()
+    values[begin:end, channel] += by
+    return dataclasses.replace(recording, parts=(Part(values),))
+
+
+@pytest.fixture(scope="module")
+def telemetry():
+    return join_channels({"volts": series(seed=5)})[0]
+
+
+def test_a_fault_is_one_event_with_its_onset_its_views_and_nominal_time_is_not_flagged(
+    single, telemetry
+):
+    scored = score(single[0], changed(telemetry, 1_000, 1_300, 4.0))
+    frame = scored.table
+    (event,) = scored.events
+    window = scored.window
+    assert window == 64 and len(frame) == 3_000 and frame["flag"].sum() == event.num_flagged
+    assert abs(event.begin - 1_000) <= 8 and 1_300 <= event.end <= 1_364
+    assert event.begin <= event.detected <= 1_000 + window and event.begin <= event.peak < event.end
+    assert "level" in event.views and event.channels == ("volts",) and event.against == "learnt"
+    assert not frame["flag"].iloc[:930].any() and frame["score"].iloc[1_100:1_250].min() > 1
+    assert scored.departure == "" and scored.not_judged == ()
+
+
+def test_the_past_alone_raises_the_alarm_with_the_sample_that_is_said(single, telemetry):
+    """With all telemetry until then the first sample is flagged, with a stride less it is not."""
+    faulty = changed(telemetry, 1_000, 1_300, 4.0)
+    scored = score(single[0], faulty)
+    frame = scored.table
+    (event,) = scored.events
+    flagged = int(np.argmax(frame["flag"]))
+    values, scorer = faulty.parts[0].values, scorer_of(single[0])
+    known = scorer.score(values[: event.detected + 1]).samples
+    assert event.detected == flagged + 63 and known[flagged] > 1
+    assert (known[:flagged] <= 1).all()
+
+
+def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
+    scored = score(of_run[0], changed(telemetry, 1_000, 1_200, 0.5), coarse_run())
+    frame = scored.table
+    assert {"value", "enhanced", "score", "flag", "out_of_range"} <= set(frame.columns)
+    assert frame["score"].iloc[1_020:1_180].min() > 1 and frame["flag"].iloc[:900].mean() < 0.05
+    clean = changed(telemetry, 1_000, 1_200, 0.5).parts[0].values[:, 0] - frame["value"]
+    assert not clean.any() and np.std(frame["value"] - frame["enhanced"]) < 0.25
+
+
+def test_samples_without_a_run_get_no_score(of_run, telemetry):
+    scored = score(of_run[0], telemetry, coarse_run(2_000))
+    frame = scored.table
+    assert frame["score"].isna().sum() == 1_000 and not frame["flag"].iloc[2_000:].any()
+    late = dataclasses.replace(telemetry, parts=(Part(telemetry.parts[0].values[500:], 5_000.0),))
+    scored = score(of_run[0], late, coarse_run(2_000))
+    frame = scored.table
+    assert (
+        frame["score"].isna().tolist() == [False] * 1_500 + [True] * 1_000
+        and frame["flag"].mean() < 0.05
+    )
+
+
+def test_an_event_across_a_gap_ends_one_interval_after_its_last_sample():
+    seconds = np.array([0, 10, 20, 500, 510])
+    frame = pd.DataFrame(index=pd.to_datetime(seconds, unit="s", utc=True))
+    event = Event(1, 5, 2, 3, 4, 2.0, 0.9, "learnt", ("step", "level"), ("volts",))
+    scored = ScoredTelemetry(frame, {}, (event,), 16, Clock.of(10.0, "2024-01-01"))
+    table = events_table(scored)
+    times = table[["begin", "end", "detected", "peak"]].iloc[0]
+    assert [time.timestamp() for time in times] == [10, 520, 20, 500]
+    assert (table["views"][0], table["channels"][0]) == ("step, level", "volts")
+
+
+def test_an_event_of_a_fast_clock_ends_one_interval_after_its_last_sample():
+    clock = Clock.of(2e-7, "2024-01-01")
+    frame = pd.DataFrame(index=clock.index(2e-7 * np.arange(5)))
+    event = Event(1, 3, 2, 2, 2, 2.0, 0.9, "learnt", ("level",), ("volts",))
+    table = events_table(ScoredTelemetry(frame, {}, (event,), 16, clock))
+    assert table["end"][0] == frame.index[3]
+
+
+def test_times_of_a_clock_from_zero_are_written_as_seconds(single, telemetry, tmp_path):
+    values = changed(telemetry, 1_500, 3_000, 6.0)
+    scored = score(single[0], dataclasses.replace(values, clock=Clock.of(10.0, "1970-01-01")))
+    write_scores(tmp_path / "scores.CSV", scored)
+    written, events = (
+        pd.read_csv(tmp_path / "scores.CSV"),
+        pd.read_csv(tmp_path / "scores.events.csv"),
+    )
+    assert written["time"].tolist() == [10.0 * number for number in range(3_000)]
+    event = scored.events[-1]
+    assert [10 * event.begin, 30_000] in events[["begin", "end"]].to_numpy().tolist() and len(
+        events
+    ) == len(scored.events)
+    assert f"since {10 * event.begin} s" in scored.departure
+
+
+def test_a_lasting_change_is_one_event_since_its_time_and_names_update(single, telemetry):
+    values = changed(telemetry, 1_500, 3_000, 6.0).parts[0].values
+    parts = Part(values[:1_200]), Part(values[1_200:], 13_000.0)  # after a gap of a hundred samples
+    scored = score(single[0], dataclasses.replace(telemetry, parts=parts))
+    frame = scored.table
+    (event,) = scored.events
+    assert abs(event.begin - 1_500) <= 8 and event.end == 3_000
+    begin = frame.index[event.begin]
+    assert begin == pd.Timestamp("2024-01-01T00:00:00Z") + pd.Timedelta(
+        seconds=13_000 + 10 * (event.begin - 1_200)
+    )
+    for words in (f"since {begin}", "level", "`update`"):
+        assert words in scored.departure
+    # flagged when it leaves, and no more although it stays
+    assert frame["flag"].iloc[1_440:1_520].any() and frame["score"].iloc[1_600:].min() > 1
+    assert frame["flag"].iloc[1_700:].mean() < 0.02
+
+
+def test_a_fault_within_a_departure_is_an_event_against_the_new_operating_point(single, telemetry):
+    values = changed(changed(telemetry, 1_000, 3_000, 6.0), 2_200, 2_400, 9.0)
+    departure, later = score(single[0], values).events
+    assert abs(departure.begin - 1_000) <= 8 and departure.end == 3_000
+    assert later.against == "new operating point" and abs(later.begin - 2_200) <= 8
+
+
+def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, telemetry):
+    # begins 500 samples later
+    run = dataclasses.replace(
+        coarse_run(), parts=(Part(coarse_run().parts[0].values[500:], 5_000.0),)
+    )
+    scored = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), run)
+    frame = scored.table
+    *_, event = scored.events
+    assert "level" in scored.departure and abs(event.begin - 1_500) <= 8
+    assert event.end == 3_000 and frame["score"].iloc[:500].isna().all()
+
+
+def test_a_channel_that_is_missing_leaves_the_others_judged(both):
+    values = changed(joint(seed=1), 1_000, 1_200, -60.0, channel=1).parts[0].values
+    watts = parts_of((Part(values[:, 1:]),), ("watts",), 10.0, joint().start, "watts")
+    scored = score(both[0], watts)
+    frame = scored.table
+    (event,) = scored.events
+    assert scored.not_judged == ("volts",) and event.channels == ("watts",)
+    assert list(frame.columns) == ["watts", "score", "flag"] and abs(event.begin - 1_000) <= 8
+    alone = scorer_of(both[0], channels=("watts",)).score(values[:, 1:]).samples
+    np.testing.assert_array_equal(frame["score"], alone)
+
+
+def test_the_channel_that_fails_is_named(both):
+    for channel, by in ((0, 4.0), (1, -60.0)):
+        scored = score(both[0], changed(joint(seed=1), 1_000, 1_200, by, channel))
+        (event,) = scored.events
+        assert event.channels[0] == ("volts", "watts")[channel]
+
+
+def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
+    # within a thousandth
+    single[0].pair(dataclasses.replace(telemetry, clock=Clock.of(10.005, telemetry.start)))
+    short = dataclasses.replace(telemetry, parts=(Part(telemetry.parts[0].values[:63]),))
+    for words, (simulator, _), given in (
+        (
+            "sample every 10 s",
+            single,
+            dataclasses.replace(telemetry, clock=Clock.of(1.0, telemetry.start)),
+        ),
+        ("at least one window of 80", single, short),
+        ("channels volts, watts", both, dataclasses.replace(joint(), columns=("volts", "amps"))),
+        ("--coarse", of_run, telemetry),
+    ):
+        with pytest.raises(InputError, match=words):
+            score(simulator, given)
+    with pytest.raises(InputError, match="false_alarm_rate"):
+        ScoreOptions(0.7)
+
+
+def test_a_simulator_without_nominal_telemetry_is_refused():
+    with pytest.raises(InputError, match="Make it with `fit`"):
+        scorer_of(of_waves([SquareWaveSimulator([SquareWave(20)])], 24))
+
+
+def test_more_false_alarms_lower_the_threshold(single):
+    rare, often = (scorer_of(single[0], ScoreOptions(rate)) for rate in (0.01, 0.2))
+    assert often.threshold < rare.threshold and often.rate == 0.2
+
+
+def test_an_event_at_the_beginning_of_a_part_is_not_detected_before_it_begins(single, telemetry):
+    (event,) = score(single[0], changed(telemetry, 104, 400, 4.0)).events
+    assert abs(event.begin - 104) <= 8 and 104 <= event.detected <= 104 + 64
+
+
+def test_a_fault_that_goes_on_after_a_gap_is_an_event_of_both_parts(single, telemetry):
+    values = changed(telemetry, 1_000, 2_000, 6.0).parts[0].values
+    parts = Part(values[:1_200]), Part(values[1_200:], 20_000.0)
+    before, after, *_ = score(single[0], dataclasses.replace(telemetry, parts=parts)).events
+    assert abs(before.begin - 1_000) <= 8 and before.end == after.begin == 1_200
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_values_that_are_not_finite_are_refused(single, telemetry, refused, value):
+    with refused("finite"):
+        score(single[0], changed(telemetry, 1_000, 1_001, value))
+
+
+def test_channels_keep_their_values_whatever_their_names(both):
+    names = ("score", "enhanced score")
+    renamed = copy.copy(both[0])
+    renamed.channels = names
+    scored = score(renamed, dataclasses.replace(joint(seed=1), columns=names))
+    values = scored.table[[scored.columns[name] for name in names]]
+    np.testing.assert_array_equal(values, joint(seed=1).parts[0].values)
+    assert list(scored.table)[2:] == ["score", "flag"]
+
+
+def test_the_enhanced_run_is_told_beside_an_outlier(of_run, telemetry):
+    calm, spoilt = (
+        score(of_run[0], changed(telemetry, 500, 501, by), coarse_run()).table["enhanced"]
+        for by in (0.0, 1e12)
+    )
+    np.testing.assert_array_equal(spoilt, calm)

@@ -1,0 +1,150 @@
+"""Files of every registered kind are read with the values and times that were written."""
+
+import gzip
+import json
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.reading.formats import READERS
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
+
+N = 80
+VALUES = (20 + 5 * np.sin(np.arange(N) / 5)).round(3)
+SECONDS = 0.5 * np.arange(N)
+FRAME = pd.DataFrame({"time": SECONDS, "volts": VALUES, "amps": 2 * VALUES})
+
+
+def hdf5(path, **groups):
+    with h5py.File(path, "w") as file:
+        for name, frame in groups.items():
+            for column in frame:
+                file[f"{name}/{column}"] = frame[column].to_numpy()
+
+
+def matlab_7_3(path):
+    """Axes in reverse order, behind a block that says so, as MATLAB 7.3 writes them."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for column in FRAME:
+            file[column] = FRAME[column].to_numpy()[None]
+    content = path.read_bytes()
+    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(512, b" ") + content[512:])
+
+
+WRITERS = {
+    ".parquet": lambda path: FRAME.to_parquet(path),
+    ".xlsx": lambda path: FRAME.to_excel(path, index=False),
+    ".xlsm": lambda path: FRAME.to_excel(path, index=False, engine="openpyxl"),
+    ".mat": lambda path: scipy.io.savemat(path, {name: FRAME[name].to_numpy() for name in FRAME}),
+    ".h5": lambda path: hdf5(path, log=FRAME),
+    ".hdf5": lambda path: hdf5(path, log=FRAME),
+    ".jsonl": lambda path: FRAME.to_json(path, orient="records", lines=True),
+    ".ndjson": lambda path: FRAME.to_json(path, orient="records", lines=True),
+    ".json": lambda path: FRAME.to_json(path, orient="records"),
+}
+OTHERS = {
+    ".dat": lambda path: FRAME.to_csv(path, index=False, sep="\t"),
+    ".log.gz": lambda path: path.write_bytes(gzip.compress(FRAME.to_csv(index=False).encode())),
+    ".parquet.gz": lambda path: path.write_bytes(gzip.compress(FRAME.to_parquet())),
+    "_struct.mat": lambda path: scipy.io.savemat(
+        path, {"log": {name: FRAME[name].to_numpy() for name in FRAME}, "rate": 2.0}
+    ),
+    "_7_3.mat": matlab_7_3,
+}
+
+
+def test_every_registered_kind_has_a_writer_here():
+    assert set(WRITERS) == set(READERS)
+
+
+@pytest.mark.parametrize("ending", [*WRITERS, *OTHERS])
+def test_a_file_is_read_as_it_was_written(tmp_path, ending):
+    (WRITERS | OTHERS)[ending](path := tmp_path / f"a{ending}")
+    (telemetry,) = read_telemetry(path)
+    assert (sorted(telemetry.columns), telemetry.interval_s) == (["amps", "volts"], 0.5)
+    np.testing.assert_allclose(telemetry.values, FRAME[list(telemetry.columns)], rtol=1e-6)
+
+
+def test_a_matrix_has_a_channel_in_each_column(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"time": SECONDS, "x": np.stack([VALUES, -VALUES], 1)})
+    (telemetry,) = read_telemetry(tmp_path / "a.mat")
+    assert telemetry.columns == ("x.0", "x.1")
+    np.testing.assert_allclose(telemetry.values[:, 1], -VALUES, rtol=1e-6)
+
+
+def test_a_table_of_several_is_named(tmp_path, refused):
+    hdf5(tmp_path / "a.h5", fast=FRAME, slow=FRAME.iloc[::4])
+    with refused("--table fast, or --table slow"):
+        read_source(tmp_path / "a.h5")
+    (telemetry,) = read_telemetry(tmp_path / "a.h5", Cleaning(table="slow"))
+    assert (len(telemetry), telemetry.interval_s) == (N // 4, 2.0)
+    with refused("'other'", "--table fast"):
+        read_source(tmp_path / "a.h5", options=Cleaning(table="other"))
+
+
+def test_a_sheet_is_named_where_the_first_holds_no_numbers(tmp_path, refused):
+    with pd.ExcelWriter(tmp_path / "a.xlsx") as book:
+        pd.DataFrame({"Project": ["pump"], "By": ["A"]}).to_excel(book, sheet_name="Info")
+        FRAME.to_excel(book, sheet_name="Data", index=False)
+        FRAME.iloc[::2].to_excel(book, sheet_name="Slow", index=False)
+    with refused("Info", "--table Data, or --table Slow"):
+        read_source(tmp_path / "a.xlsx")
+    (telemetry,) = read_telemetry(tmp_path / "a.xlsx", Cleaning(table="Slow"))
+    assert telemetry.interval_s == 1.0
+
+
+def test_lines_on_top_are_left_out_and_counted_in_places(tmp_path, refused):
+    text = "1,2,3\n4,5,6\n" + FRAME.to_csv(index=False) + "50,x,1\n"
+    (tmp_path / "a.csv").write_text(text)
+    with refused(f"'x' at line {N + 4}"):
+        read_telemetry(tmp_path / "a.csv", Cleaning(skip_rows=2))
+    (telemetry,) = read_telemetry(tmp_path / "a.csv", Cleaning(skip_rows=2, drop_bad=True))
+    assert telemetry.columns == ("volts", "amps")
+
+
+def test_channels_in_rows_are_refused(tmp_path, refused):
+    np.save(tmp_path / "a.npy", np.zeros((3, 500)))
+    scipy.io.savemat(tmp_path / "a.mat", {"x": np.random.default_rng(0).normal(size=(3, 500))})
+    for name in ("a.npy", "a.mat"):
+        with refused("channels first", "transposed"):
+            read_source(tmp_path / name)
+
+
+def test_words_are_channels_of_zero_and_one_on_request(tmp_path, refused):
+    heater = np.where(np.arange(N) % 20 < 8, "ON", "OFF")
+    mode = np.array(["SAFE", "RUN", "IDLE", "RUN"])[np.arange(N) // 20]
+    frame = pd.DataFrame({"time": SECONDS, "heater": heater, "mode": mode})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    with refused("--states"):
+        read_source(tmp_path / "a.csv")
+    (telemetry,) = read_telemetry(tmp_path / "a.csv", Cleaning(states=True))
+    assert telemetry.columns == ("heater", "mode=IDLE", "mode=RUN", "mode=SAFE")
+    np.testing.assert_array_equal(telemetry.values[:, 0], heater == "ON")
+    np.testing.assert_array_equal(telemetry.values[:, 2], mode == "RUN")
+
+
+def test_deep_json_is_refused(tmp_path, refused):
+    for name, text in (("a.jsonl", "[" * 100_000), ("b.json", json.dumps({"a": 1})[:-1])):
+        (tmp_path / name).write_text(text)
+        with refused(name, "cannot be read"):
+            read_source(tmp_path / name)
+
+
+def test_an_answer_of_prometheus_says_what_makes_a_table_of_it(tmp_path):
+    values = [[1_709_251_200 + 15 * row, str(row / 4)] for row in range(20)]
+    answer = {"status": "success", "data": {"result": [{"metric": {}, "values": values}]}}
+    for indent in (None, 1):
+        file = tmp_path / "a.json"
+        file.write_text(json.dumps(answer, indent=indent))
+        with pytest.raises(InputError, match="one record") as refused:
+            read_source(file)
+        recipe = str(refused.value).rpartition("of Prometheus, ")[2].removesuffix(".")
+        (series,) = read_source(eval(recipe, {"pandas": pd, "json": json, "file": file})).values()
+        telemetry = clean(series).telemetry
+        assert telemetry.start == "2024-03-01T00:00:00+00:00" and telemetry.interval_s == 15
+        np.testing.assert_array_equal(telemetry.values[:, 0], np.arange(20) / 4)
