@@ -30,6 +30,7 @@ _LEAST_LEARNT = 200  # windows, however many channels
 _LEAST_WINDOWS = 8  # of nominal telemetry
 _LEAST_UNIT = 0.01  # of a view
 _LEAST_THRESHOLD = 1.0  # one view at its quantile
+_TIES = 1.001  # times the threshold: a repeated window has the same score, but for rounding
 # relative to the level: a deviation that is rounding error, and the unit of a channel without more
 _ROUNDING = 1e-12
 _UNIT = 1e-6
@@ -147,7 +148,7 @@ class Scorer:
 
         whole, self.rate = limit_of(scores, len(scores))
         late, _ = limit_of(scores[last_block:], len(scores) - last_block)
-        self.threshold = max(_LEAST_THRESHOLD, whole, late)
+        self.threshold = _TIES * max(_LEAST_THRESHOLD, whole, late)
         of_windows, _ = limit_of(np.concatenate(sums), len(scores))
         self._threshold_of_windows = max(self.threshold, of_windows)
         self.nominal_scores = scores / self.threshold

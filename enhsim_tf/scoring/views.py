@@ -52,8 +52,9 @@ class Shape:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the Euclidean distances."""
         shapes = _centred(windows)
-        nearest = np.min(self._squares - 2 * shapes @ self._shapes.T, axis=1)
-        return np.sqrt(np.maximum(np.sum(shapes**2, axis=1) + nearest, 0.0))
+        nearest = np.argmin(self._squares - 2 * shapes @ self._shapes.T, axis=1)
+        # not from the squares: a small difference of large numbers would be rounding error
+        return np.linalg.norm(shapes - self._shapes[nearest], axis=1)
 
 
 class Subspace:
@@ -74,8 +75,8 @@ class Subspace:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the distances."""
         values = _flat(windows) - self._mean
-        inside = np.sum((values @ self._components.T) ** 2, axis=1)
-        return np.sqrt(np.maximum(np.sum(values**2, axis=1) - inside, 0.0))
+        inside = values @ self._components.T @ self._components
+        return np.linalg.norm(values - inside, axis=1)
 
 
 class Level:
