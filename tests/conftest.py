@@ -29,7 +29,7 @@ for threads in (
     # two test processes run at a time, and waiting threads would also use CPU time
     os.environ.setdefault(threads, "1")
 # on a busy machine Ray's server may need more than its 30 s to start
-os.environ.setdefault("RAY_gcs_server_port_wait_time_s", "300")
+os.environ.setdefault("RAY_gcs_server_port_wait_time_s", "120")
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
 

@@ -25,6 +25,7 @@ from enhsim_tf.simulator.model_folder import channels_of, models_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from tests.fitted_simulators import TINY
 from tests.known_simulators import of_waves
+from tests.ray_servers import starts_ray
 
 ROOT = Path(__file__).parents[2]
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -598,12 +599,10 @@ def test_a_closed_pipe_ends_the_command_without_a_message(world, tmp_path):
     [
         ("local", 1),
         pytest.param("local", 8, marks=pytest.mark.slow),
-        pytest.param("ray", 10, marks=pytest.mark.slow),
+        pytest.param("ray", 10, marks=[pytest.mark.slow, starts_ray]),
     ],
 )
 def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_path):
-    if engine == "ray":
-        pytest.importorskip("ray", reason="the optional extra ray is not installed")
     process = started(
         f"fit {world}/two.csv --out {tmp_path}/models --workers 2 --epochs 1000000 --separately "
         f"--enhancer network --engine {engine}",
@@ -617,8 +616,9 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
     out, error = process.communicate(timeout=60)
     assert (process.returncode, error) == (130, "interrupted; what was finished is kept\n")
     assert out.startswith("reading ...\n")
+    end = time.monotonic() + 60
     with pytest.raises(ProcessLookupError):  # no process of the session is left
-        while True:
+        while time.monotonic() < end:
             os.killpg(process.pid, 0)
             time.sleep(0.1)
     assert not names_in(tmp_path)
