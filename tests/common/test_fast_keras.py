@@ -48,10 +48,13 @@ def small_enhancer():
 
 
 # of a block; none divides the 20 rows of the widest kernel, and 400 are no block
-@pytest.mark.parametrize("rows", [3, 13, 400])
 @pytest.mark.parametrize(
-    ("batch_size", "rate"),
-    [(20, lambda: keras.optimizers.schedules.CosineDecay(0.003, 20)), (33, lambda: 0.001)],
+    ("rows", "batch_size", "rate"),
+    [
+        (3, 20, lambda: keras.optimizers.schedules.CosineDecay(0.003, 20)),
+        (13, 33, lambda: 0.001),
+        (400, 33, lambda: 0.001),
+    ],
 )
 def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
     monkeypatch.setattr(fast_keras, "BLOCK_BYTES", 4 * UNITS * rows)

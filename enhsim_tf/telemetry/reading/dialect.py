@@ -2,6 +2,7 @@
 columns' names.
 """
 
+import codecs
 import csv
 import dataclasses
 import re
@@ -16,9 +17,9 @@ _WHOLE = ""  # the separator of files of one column
 _SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal sign
 # lines and characters that are inspected
 _HEAD_LINES = 300
-_HEAD = 4_000_000
+HEAD = 4_000_000
 _LOOK = 50  # columns that are inspected
-csv.field_size_limit(_HEAD)  # with another separator than its own, a line is one cell
+csv.field_size_limit(HEAD)  # with another separator than its own, a line is one cell
 _NUMBER = (
     r"(?:[+-] *)?(?:\d[\d.,'\u2019 \u00a0\u202f]*|[.,]\d+)(?:[de][+-]?\d+)?"
     r"(?: ?(?:[num\u00b5]?s|sec|min|h|hr|days?|%))?"
@@ -44,32 +45,44 @@ class Dialect:
     may_lack_last: bool = False  # whether rows may leave out the last cell
 
 
-def decode(content: bytes) -> tuple[str, list[Finding]]:
-    """Decodes the content of a text file, and returns findings for the cleaning log; raises a
-    `ValueError` if it is not text.
+def utf8_of(content: bytes) -> tuple[bytes, list[Finding]]:
+    """Returns the content of a text file in UTF-8 with lines that end with a line feed, and
+    findings for the cleaning log; raises a `ValueError` if it is not text.
     """
     findings = []
-    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        text = content.decode("utf-16")
+    if content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        text = content.decode("utf-16").encode()
     else:
-        whole = content.rstrip(b"\x00")
-        if len(whole) < len(content):
-            text = f"NUL bytes at the end, as after a power failure: {len(content) - len(whole):,}"
-            findings.append(Finding("padding", len(content) - len(whole), text))
+        text = content.rstrip(b"\x00")
+        if len(text) < len(content):
+            cut = f"NUL bytes at the end, as after a power failure: {len(content) - len(text):,}"
+            findings.append(Finding("padding", len(content) - len(text), cut))
+        text = text.removeprefix(codecs.BOM_UTF8)
         try:
-            text = whole.decode("utf-8-sig")  # with or without a byte order mark
+            if not text.isascii():
+                text.decode()
         except UnicodeDecodeError:
-            text = whole.decode("cp1252", "replace")
+            text = text.decode("cp1252", "replace").encode()
             findings.append(
                 Finding("encoding", 1, "the text is not UTF-8 and was read as Windows-1252")
             )
-    if "\x00" in text:
+    if b"\x00" in text:
         raise ValueError("it is not text")
-    if "\r" in text and "\n" not in text:
-        text = text.replace("\r", "\n")
+    if b"\r" in text and b"\n" not in text:
+        text = text.replace(b"\r", b"\n")
     if not text or text.isspace():
         raise ValueError("it is empty")
     return text, findings
+
+
+def behind(text: bytes, lines: int) -> bytes:
+    """Returns what follows the first lines of a text."""
+    begin = 0
+    for _ in range(lines):
+        begin = text.find(b"\n", begin) + 1
+        if not begin:
+            return b""
+    return text[begin:]
 
 
 def find_dialect(text: str, name: str, no_header: bool, separator: str | None = None) -> Dialect:
@@ -80,7 +93,7 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         InputError: If there is no line of names above the data, and `no_header` is False.
         ValueError: If there is nothing but comments.
     """
-    lines = [line.rstrip("\r") for line in text[:_HEAD].split("\n", _HEAD_LINES)[:_HEAD_LINES]]
+    lines = [line.rstrip("\r") for line in text[:HEAD].split("\n", _HEAD_LINES)[:_HEAD_LINES]]
     # as spreadsheets write it
     if stated := re.fullmatch(r'"?sep=(.)"?', lines[0].strip(" \ufeff")):
         lines[0] = ""

@@ -23,7 +23,7 @@ from enhsim_tf.telemetry.cleaning.numbers import (
 )
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import ROWS, Finding, Places
-from enhsim_tf.telemetry.reading.dialect import BLANKS, Dialect, decode, find_dialect
+from enhsim_tf.telemetry.reading.dialect import BLANKS, HEAD, Dialect, behind, find_dialect, utf8_of
 
 _HEAD = 100_000  # bytes that are searched for blanks before cells
 _LOOK = 2_000  # cells of a column that are searched for a decimal comma
@@ -77,14 +77,15 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
         InputError: If it has no header, or its decimal sign cannot be told.
         ValueError: If it cannot be read. The message says why.
     """
-    text, findings = decode(content)
+    text, findings = utf8_of(content)
     if options.skip_rows:
-        text = "".join(text.split("\n", options.skip_rows)[options.skip_rows :])
+        text = behind(text, options.skip_rows)
         if not text.strip():
             raise ValueError(f"no line is left behind skip_rows={options.skip_rows}")
-    if _ANNOTATION.search(text[:10_000]):
-        return _read_annotated(text, name, findings)
-    dialect = find_dialect(text, name, options.no_header)
+    head = text[:HEAD].decode(errors="ignore")  # its end may cut a character
+    if _ANNOTATION.search(head[:10_000]):
+        return _read_annotated(text.decode(), name, findings)
+    dialect = find_dialect(head, name, options.no_header)
     if dialect.skipped:
         findings.append(
             Finding(
@@ -93,7 +94,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 f"lines before the data that were skipped: {dialect.skipped:,}",
             )
         )
-    data = b"".join(text.encode().split(b"\n", dialect.first_line)[dialect.first_line :])
+    data = behind(text, dialect.first_line)
     if not data or data.isspace():
         raise InputError(
             f"Expected rows below the header. Received: only names in {name}, "
