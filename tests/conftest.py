@@ -35,8 +35,6 @@ from enhsim_tf.common.errors import InputError  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 SLOW = "--slow"
-# folders whose files share fixtures that take seconds: a process runs all of a folder
-TOGETHER = ("fitting", "paper", "scoring", "simulator")
 LEFT = pytest.StashKey[int]()
 
 
@@ -45,9 +43,7 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leaves the slow tests out, unless they are asked for, and gives each file or folder to one
-    process.
-    """
+    """Leaves the slow tests out, unless they are asked for."""
     if not config.getoption(SLOW):
         left = {item for item in items if item.get_closest_marker("slow")}
         config.hook.pytest_deselected(items=list(left))
@@ -55,13 +51,6 @@ def pytest_collection_modifyitems(config, items):
         config.stash[LEFT] = len(left)
         if hasattr(config, "workeroutput"):  # a process of xdist, which tells the first one
             config.workeroutput["left"] = len(left)
-    for item in items:
-        folder = item.path.parent.name
-        item.add_marker(
-            pytest.mark.xdist_group(
-                folder if folder in TOGETHER else item.nodeid.partition("::")[0]
-            )
-        )
 
 
 @pytest.hookimpl(optionalhook=True)

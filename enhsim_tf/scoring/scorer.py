@@ -91,8 +91,9 @@ class Scorer:
     Attributes:
         window: Length of the windows in samples: 64, or a twenty-fifth of a record that is shorter
             than 1,600 samples, but at least 16; less where too few parts are that long.
-        threshold: The conformal threshold of the sum: the larger one of all nominal samples and of
-            the last block of them. Where there are too few windows for the rate, the largest score.
+        threshold: The conformal threshold of the sum, and a thousandth of it for rounding: the
+            larger one of all nominal samples and of the last block of them. Where there are too few
+            windows for the rate, that of the largest score.
         rate: The false-alarm rate that the threshold is set for.
         nominal_scores: Scores of the nominal samples in units of the threshold, from views that
             have not learnt them, in the order of time.

@@ -135,6 +135,7 @@ def test_a_channel_of_ones_own_keeps_its_times_and_is_scaled_by_its_square_wave(
     np.testing.assert_allclose(kept.values, slope * values + offset, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_claims_that_need_the_true_signal_are_not_measured_on_a_channel_of_ones_own(tmp_path):
     noise = 0.1 * np.random.default_rng(0).standard_normal(4_000)
     np.save(tmp_path / "x.npy", np.sin(np.arange(4_000) / 15) + noise)
@@ -145,10 +146,11 @@ def test_claims_that_need_the_true_signal_are_not_measured_on_a_channel_of_ones_
     assert left == ["C3", "C8", "C9"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stage", "kept"),
     [
-        pytest.param("enhancer", ["telemetry"], marks=pytest.mark.slow),
+        ("enhancer", ["telemetry"]),
         ("noise GAN", ["telemetry", "enhancer", "enhancement"]),
     ],
 )

@@ -15,7 +15,6 @@ from notebooks import build
 from notebooks.lesson_tools import CLAIMS, FIGURES, NOT_ANSWERED, RIGHT, ROOT, SMOKE
 
 SOURCES = build.sources()
-QUICK = "02_source_target"  # trains nothing
 each_lesson = pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
 
 
@@ -91,15 +90,8 @@ def cache(tmp_path_factory):
         yield
 
 
-@pytest.mark.parametrize(
-    "source",
-    [
-        pytest.param(
-            source, id=source.stem, marks=[] if source.stem == QUICK else [pytest.mark.slow]
-        )
-        for source in SOURCES
-    ],
-)
+@pytest.mark.slow
+@each_lesson
 def test_a_lesson_runs_and_its_solutions_are_right(source, cache):
     notebook = build.execute(source, SMOKE, solved=True)
     checks = [
