@@ -174,9 +174,7 @@ function look(window, directions) {
   for (let sample = 1; sample < window.length; sample++) {
     step = Math.max(step, Math.abs(window[sample] - window[sample - 1]));
   }
-  const [mean, ...components] = directions, centred = add(window, mean, -1);
-  const within = components.map((component) => product(centred, component) ** 2);
-  const distance = Math.sqrt(Math.max(product(centred, centred) - total(within), 0));
+  const rest = outside(window, directions), distance = Math.sqrt(product(rest, rest));
   return [distance, average(window), Math.log(deviation(window) + FLAT), step];
 }
 
