@@ -23,7 +23,7 @@ BASE = "base"
 AUTHOR = "author's configuration"
 COLUMNS = (BASE, AUTHOR)
 """The readings that decide verdicts, beside the former base."""
-PLANNED = 20  # runs of each: ten seeds, two roundings
+
 FACTORS: Mapping[str, Mapping[str, Any]] = {
     "2 pi": {"latent_scale": 2 * math.pi},
     "two updates": {"update": "two of 200"},

@@ -36,7 +36,6 @@ from studies.readings.run import (
     FACTORS,
     FORMER,
     KEYS,
-    PLANNED,
     READINGS,
 )
 
@@ -187,8 +186,8 @@ def publish(table: pd.DataFrame) -> dict[str, Any]:
     done = {name: num_runs(table, name) for name in DECIDING}
     return {
         "title": title([claims[claim.id]["verdict"] for claim in CLAIMS if claim.is_tested]),
-        "basis": f"{done[BASE]} of {PLANNED} runs of the base, {done[AUTHOR]} of {PLANNED} of the "
-        f"author's configuration, {done[FORMER]} of the former base",
+        "basis": f"{done[BASE]} runs of the base, {done[AUTHOR]} of the author's configuration, "
+        f"{done[FORMER]} of the former base",
         "claims": claims,
     }
 
