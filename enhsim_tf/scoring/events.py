@@ -30,7 +30,7 @@ class Event:
         begin: Estimated onset, the first sample that is anomalous.
         end: The first sample after the last score above the threshold.
         detected: The sample with which a scorer that has seen only the past raises the alarm.
-        peak: The sample with the highest score.
+        peak: The sample with the highest score since `begin`.
         num_flagged: Number of flagged samples.
         score: The highest score; the threshold is 1.
         confidence: See `confidence_of`.

@@ -215,14 +215,16 @@ def _events(
         past = scorer.window_scores(seen[low : raised + window])
         is_under_way = flagged < window and past[0] > 1
         begin = flagged if is_under_way else low + onset_of(past, raised - low, window)
-        peak = flagged + int(np.argmax(scores.samples[flagged:end]))
+        height = flagged + int(np.argmax(scores.samples[flagged:end]))
+        # the windows that hold the first anomalous sample raise the scores of samples before it
+        peak = begin + int(np.argmax(scores.samples[begin : max(end, begin + 1)]))
         onset = min(begin, len(seen) - window)
         last = min(len(seen), onset + MEMORY * window, max(end, onset + window))
         firsts = range(onset, last - window + 1, window)
         shares = sum(scorer.shares(seen[first : first + window]) for first in firsts)
-        holds_peak = (scores.begins <= peak) & (scores.begins > peak - window)
+        holds_peak = (scores.begins <= height) & (scores.begins > height - window)
         by_view = max(scores.by_view.T[holds_peak], key=np.sum)
-        highest = float(scores.samples[peak])
+        highest = float(scores.samples[height])
         events.append(
             Event(
                 place + begin,

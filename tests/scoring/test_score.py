@@ -70,6 +70,25 @@ def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
     assert not clean.any() and np.std(frame["value"] - frame["enhanced"]) < 0.25
 
 
+def test_an_event_ends_where_the_run_has_a_gap(of_run, telemetry):
+    whole = coarse_run()
+    values = whole.parts[0].values
+    run = dataclasses.replace(whole, parts=(Part(values[:1_500]), Part(values[1_600:], 16_000.0)))
+    scored = score(of_run[0], changed(telemetry, 1_300, 3_000, 0.5), run)
+    before = next(event for event in scored.events if abs(event.begin - 1_300) <= 8)
+    after = scored.events[scored.events.index(before) + 1]
+    assert before.end == 1_500 and after.begin == 1_600
+    assert np.flatnonzero(scored.table["score"].isna()).tolist() == [*range(1_500, 1_600)]
+    ends = events_table(scored)["end"] - scored.table.index[0]
+    assert ends[scored.events.index(before)] == pd.Timedelta(seconds=15_000)
+
+
+def test_no_event_has_its_peak_before_it_begins(of_run, telemetry):
+    options = ScoreOptions(false_alarm_rate=0.2)
+    events = score(of_run[0], telemetry, coarse_run(), options).events
+    assert events and all(one.begin <= one.peak < one.end for one in events)
+
+
 def test_samples_without_a_run_get_no_score(of_run, telemetry):
     scored = score(of_run[0], telemetry, coarse_run(2_000))
     frame = scored.table
