@@ -35,7 +35,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--another-processor",
         action="store_true",
-        help="only these two, on another processor than the runs of DIR",
+        help="this is another processor than that of the runs in DIR",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("results/readings"), metavar="DIR", help="output folder"

@@ -11,7 +11,7 @@ import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -94,30 +94,29 @@ class Run(NamedTuple):
 
 
 def runs(num_columns: int, num_others: int, on_another: bool = False) -> list[Run]:
-    """The runs in their order, in each step all readings with one seed before the next seed: both
-    columns, then the other readings, then the columns with another rounding.
+    """The runs in their order: all readings with one seed before the next seed, both columns first,
+    and at last the columns with another rounding.
 
     Args:
         num_columns: Number of seeds of the columns, and of the control with white noise.
         num_others: Number of seeds of every other reading, of 5,000 iterations at most three.
-        on_another: Whether this is another processor than that of the other runs; only the
-            columns are run on it.
+        on_another: Whether this is another processor than that of the first runs.
     """
-
-    def of_columns(rounding: str) -> list[Run]:
-        return [Run(reading, rounding, seed) for seed in range(num_columns) for reading in COLUMNS]
-
-    if on_another:
-        return of_columns(ANOTHER)
     white, _, long = CONTROLS
-    seeds = {white: num_columns, long: min(num_others, 3)}
-    others = [
-        Run(reading, "oneDNN", seed)
-        for seed in range(max(num_columns, num_others))
-        for reading in READINGS
-        if reading not in (*COLUMNS, *KEPT) and seed < seeds.get(reading, num_others)
-    ]
-    return of_columns("oneDNN") + others + of_columns("Eigen")
+    seeds = dict.fromkeys((*COLUMNS, white), num_columns) | {long: min(num_others, 3)}
+
+    def of_seeds(readings: Iterable[str], rounding: str) -> list[Run]:
+        return [
+            Run(reading, rounding, seed)
+            for seed in range(max(num_columns, num_others))
+            for reading in readings
+            if seed < seeds.get(reading, num_others)
+        ]
+
+    planned = [reading for reading in READINGS if reading not in KEPT]
+    if on_another:
+        return of_seeds(planned, ANOTHER)
+    return of_seeds(planned, "oneDNN") + of_seeds(COLUMNS, "Eigen")
 
 
 def collect(

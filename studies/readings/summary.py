@@ -9,7 +9,8 @@ can change without a run.
 """
 
 import collections
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -246,36 +247,58 @@ def basic(limit: Limit) -> Limit:
 
 def effects(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     """What each change of the factorial does to some measurements, and the largest effect of a pair
-    of changes: differences of means, with 95 % intervals by Student's t over seeds.
+    of changes: differences of means, with Student's 95 % intervals.
+
+    A block is a seed with one rounding that has all runs of the factorial. The variance is that
+    which readings and blocks leave (Box, Hunter and Hunter 2005, chapters 4 and 5), so that a few
+    blocks of sixteen runs give it many degrees of freedom.
 
     Returns:
-        Header and rows; no rows without a seed that has all runs of the factorial.
+        Header and rows; no rows without a complete block.
     """
-    from studies.common.statistics import t_interval
     from studies.readings.run import FACTORIAL
 
-    complete = table[(table["rounding"] == "oneDNN") & table["reading"].isin(FACTORIAL)]
     signs_of = pd.DataFrame(
         {name: {reading: 1 if name in reading else -1 for reading in FACTORIAL} for name in FACTORS}
     )
     pairs = {
         f"{one} x {other}": signs_of[one] * signs_of[other]
-        for at, one in enumerate(FACTORS)
-        for other in list(FACTORS)[at + 1 :]
+        for one, other in itertools.combinations(FACTORS, 2)
     }
+    planned = table[table["reading"].isin(FACTORIAL)]
     rows = []
     for claim, name in MEASURED:
-        values = measurements(complete, claim).reindex(columns=[name])[name]
-        values = values.unstack("reading").dropna()
-        if not len(values) or set(values.columns) != set(FACTORIAL):
+        values = measurements(planned, claim).reindex(columns=[name])[name]
+        values = values.unstack("reading").reindex(columns=FACTORIAL).dropna()
+        if not len(values):
             continue
-        row = [f"{claim}: {name}", f"{values.to_numpy().mean():.3g}"]
-        for change in FACTORS:
-            row.append(_effect(t_interval(2 * (values * signs_of[change]).mean(axis=1))))
-        found = {pair: t_interval(2 * (values * sign).mean(axis=1)) for pair, sign in pairs.items()}
-        largest = max(found, key=lambda pair: abs(found[pair]["mean"]))
-        rows.append([*row, f"{largest}: {_effect(found[largest])}"])
+        half = _half_interval(values.to_numpy())
+        of_change = 2 * values.mean() @ signs_of / len(FACTORIAL)
+        of_pair = 2 * values.mean() @ pd.DataFrame(pairs) / len(FACTORIAL)
+        largest = of_pair.abs().idxmax()
+        rows.append(
+            [
+                f"{claim}: {name}",
+                f"{values.to_numpy().mean():.3g}",
+                *(_effect(of_change[change], half) for change in FACTORS),
+                f"{largest}: {_effect(of_pair[largest], half)}",
+            ]
+        )
     return ["measurement", "mean", *FACTORS, "largest pair"], rows
+
+
+def _half_interval(values: np.ndarray) -> float | None:
+    """Half of the 95 % interval of every effect, from `values` of shape `(blocks, readings)`; None
+    for one block, which leaves no variance.
+    """
+    from scipy.stats import t
+
+    num_blocks, num_readings = values.shape
+    freedom = (num_blocks - 1) * (num_readings - 1)
+    if not freedom:
+        return None
+    left = values - values.mean(axis=0) - values.mean(axis=1, keepdims=True) + values.mean()
+    return float(t.ppf(0.975, freedom) * 2 * np.sqrt((left**2).sum() / freedom / values.size))
 
 
 MEASURED = (
@@ -290,10 +313,10 @@ MEASURED = (
 """Measurements for which the effects are shown."""
 
 
-def _effect(found: Mapping[str, float | None]) -> str:
-    if found["low"] is None:
-        return f"{found['mean']:+.3g}"
-    return f"{found['mean']:+.3g} ({found['low']:+.3g} to {found['high']:+.3g})"
+def _effect(mean: float, half: float | None) -> str:
+    if half is None:
+        return f"{mean:+.3g}"
+    return f"{mean:+.3g} ({mean - half:+.3g} to {mean + half:+.3g})"
 
 
 def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:

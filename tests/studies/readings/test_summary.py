@@ -4,6 +4,7 @@ import itertools
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from enhsim_tf.paper.claims import CLAIMS, outside
 from enhsim_tf.paper.report import UNDECIDED, read_published
@@ -58,12 +59,13 @@ def published_table():
     return pd.read_parquet(PUBLISHED / "readings" / "results" / "measurements.parquet")
 
 
-def test_the_plan_begins_with_both_columns_seed_by_seed():
+def test_the_plan_has_all_readings_of_a_seed_before_the_next_seed():
     planned = runs(10, 5)
     assert len(planned) == len(set(planned)) == 2 * 10 + 2 * 10 + 15 * 5 + 5 * 5 + 10 + 5 + 3
-    assert planned[:20] == [Run(name, "oneDNN", seed) for seed in range(10) for name in COLUMNS]
-    assert {run.seed for run in planned[20 : 20 + 23]} == {0}
-    assert {run.reading for run in planned} == set(READINGS) - set(KEPT)
+    first = {run.reading: run for run in planned[:25]}
+    assert set(first) == set(READINGS) - set(KEPT) and tuple(first)[:2] == COLUMNS
+    assert set(first.values()) == {Run(reading, "oneDNN", 0) for reading in first}
+    assert planned[-20:] == [Run(name, "Eigen", seed) for seed in range(10) for name in COLUMNS]
 
 
 def test_the_published_runs_were_planned():
@@ -141,7 +143,7 @@ def test_a_finished_run_is_kept_and_not_done_again(tmp_path, monkeypatch):
         )
 
     monkeypatch.setattr(runs_of.subprocess, "run", fake)
-    planned = [runs(1, 1)[0], *runs(1, 1)[-3:]]
+    planned = [*runs(1, 1)[:2], *runs(1, 1)[-2:]]
     arguments = ("smoke", tmp_path / "cache", tmp_path, lambda line: None)
     with pytest.raises(KeyboardInterrupt):
         collect(planned, *arguments)
@@ -165,6 +167,35 @@ def test_an_effect_of_the_factorial_is_the_difference_that_a_change_makes():
         cells = dict(zip(header, row, strict=True))
         assert cells["2 pi"].startswith("+0.5 (+0.5 to +0.5)")
         assert float(cells["two updates"].split()[0]) == pytest.approx(0, abs=1e-9)
+
+
+def test_the_interval_of_an_effect_is_that_of_least_squares():
+    """Against a regression on all effects and blocks at once."""
+    rng = np.random.default_rng(0)
+    blocks = [("oneDNN", 0), ("oneDNN", 1), ("Eigen", 0)]
+    claim, name = MEASURED[0]
+    rows = [
+        (reading, *block, claim, name, rng.normal()) for block in blocks for reading in FACTORIAL
+    ]
+    header, ((_, _, *cells, _),) = effects(
+        pd.DataFrame(rows, columns=[*runs_of.KEYS, "claim", "name", "value"])
+    )
+    signs_of = np.array([[1 if change in row[0] else -1 for change in FACTORS] for row in rows])
+    pairs = [
+        signs_of[:, one] * signs_of[:, two] for one, two in itertools.combinations(range(5), 2)
+    ]
+    of_block = [[tuple(row[1:3]) == block for block in blocks] for row in rows]
+    design = np.column_stack([signs_of, *pairs, np.array(of_block, float)])
+    values = np.array([row[-1] for row in rows])
+    found, (left,), rank, _ = np.linalg.lstsq(design, values)
+    freedom = len(values) - rank
+    errors = np.sqrt(left / freedom * np.diag(np.linalg.inv(design.T @ design)))
+    half = stats.t.ppf(0.975, freedom) * errors
+    expected = [
+        f"{2 * mean:+.3g} ({2 * (mean - side):+.3g} to {2 * (mean + side):+.3g})"
+        for mean, side in zip(found[:5], half[:5], strict=True)
+    ]
+    assert cells == expected
 
 
 def test_the_shares_of_the_figure_add_up_and_follow_the_factor():
