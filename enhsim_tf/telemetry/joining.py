@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.telemetry.series import Clock, Part, Telemetry, check_telemetry
 
 _LEAST_SHARED = 0.5  # channels that share a smaller part of their time do not become one model
@@ -60,6 +60,11 @@ def _single(name: str, given: Sequence[Telemetry] | Telemetry) -> Telemetry:
         )
     for piece in pieces:
         check_telemetry(piece)
+        if len(piece.columns) > 1:
+            raise InputError(
+                f"Expected parts of one channel. Received: {counted(len(piece.columns), 'channel')}"
+                f" in {piece.name}. Give each of its telemetry on its own."
+            )
     clock = pieces[0].clock
     if len(pieces) == 1:
         return Telemetry(pieces[0].parts, (name,), clock)
@@ -141,6 +146,9 @@ def one_series(
     if not isinstance(telemetry, Mapping | Sequence):
         check_telemetry(telemetry)
     if not isinstance(telemetry, Mapping):
+        if len(telemetry) == 1:
+            check_telemetry(telemetry[0])
+            return telemetry[0]
         telemetry = {getattr(next(iter(telemetry), None), "name", "telemetry"): telemetry}
     groups = join_channels(telemetry)
     if len(groups) > 1:

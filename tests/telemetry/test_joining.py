@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.joining import join_channels
+from enhsim_tf.telemetry.joining import join_channels, one_series
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut, times_of
 
@@ -95,3 +95,14 @@ def test_clocks_are_compared_over_their_whole_length(interval_s, groups):
     assert [group.columns for group in found] == groups
     for group in found:
         np.testing.assert_array_equal(group.values[:, -1], values)
+
+
+def test_what_the_door_returns_is_taken_as_it_is():
+    (joined,) = join_channels({"a": part(0, 50), "b": part(0, 50)})
+    assert one_series([joined]) is joined is one_series(joined)
+
+
+def test_several_series_of_several_channels_are_given_on_their_own(refused):
+    (joined,) = join_channels({"a": part(0, 50), "b": part(0, 50)})
+    with refused("Expected parts of one channel. Received: 2 channels in"):
+        one_series([joined, part(0, 50)])
