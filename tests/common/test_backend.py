@@ -86,13 +86,10 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before < 5 * 100)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the allocator of glibc")
 @pytest.mark.parametrize(
-    ("environment", "kept"),
-    [
-        ({}, "True"),
-        pytest.param({"MALLOC_MMAP_MAX_": "65536"}, "False", marks=pytest.mark.slow),
-    ],
+    ("environment", "kept"), [({}, "True"), ({"MALLOC_MMAP_MAX_": "65536"}, "False")]
 )
 def test_freed_memory_is_kept_unless_the_user_says_otherwise(environment, kept):
     assert run(FAULTS, **environment).stdout == f"{kept}\n"

@@ -135,6 +135,7 @@ def test_fast_training_gives_the_weights_of_plain_keras_where_nothing_is_dropped
         np.testing.assert_allclose(quick, plain, rtol=1e-3, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_gan_approaches_the_standard_deviation_of_white_noise():
     gan = make_gan(
         window=40,

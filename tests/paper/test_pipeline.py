@@ -30,15 +30,21 @@ def test_without_an_average_the_noise_is_what_was_added_to_the_signal(pipeline, 
     assert np.var(pipeline.noise_series("train")) == pytest.approx(0.96 * 0.01, rel=0.05)
 
 
-def test_every_update_gets_rows_drawn_anew_from_the_whole_train_part(
-    pipeline, tmp_path, monkeypatch
-):
-    batches, rows = [], noise.Rows.__getitem__
-    monkeypatch.setattr(
-        noise.Rows, "__getitem__", lambda *at: batches.append(rows(*at)) or batches[-1]
-    )
-    fresh = tiny_pipeline(tmp_path)
-    _ = fresh.gan_folder
+@pytest.fixture(scope="module")
+def afresh(tmp_path_factory):
+    """A second run with an empty cache, the cache, and the real rows of its GAN by batches."""
+    folder, batches, rows = tmp_path_factory.mktemp("afresh"), [], noise.Rows.__getitem__
+    fresh = tiny_pipeline(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            noise.Rows, "__getitem__", lambda *at: batches.append(rows(*at)) or batches[-1]
+        )
+        _ = fresh.gan_folder
+    return fresh, folder, batches
+
+
+def test_every_update_gets_rows_drawn_anew_from_the_whole_train_part(afresh):
+    fresh, _, batches = afresh
     drawn = np.concatenate(batches)
     assert len(np.unique(drawn[:, 0])) > 0.9 * len(drawn)
     assert set(drawn[:, 0]) <= set(fresh.noise_series("train"))
@@ -65,11 +71,11 @@ def test_a_second_run_takes_every_stage_from_the_cache_and_finds_the_same(record
 
 
 def test_a_run_from_nothing_finds_the_same_and_another_reading_trains_only_what_it_touches(
-    pipeline, cache, tmp_path
+    pipeline, cache, afresh
 ):
-    fresh = tiny_pipeline(tmp_path)
+    fresh, folder, _ = afresh
     np.testing.assert_array_equal(fresh.history["sd"], pipeline.history["sd"])
-    other = tiny_pipeline(tmp_path, latent_scale=1)
+    other = tiny_pipeline(folder, latent_scale=1)
     assert other.history["sd"][0] != fresh.history["sd"][0]
     assert (other.stages.cached["telemetry"], other.stages.cached["noise GAN"]) == (True, False)
     other = tiny_pipeline(cache, latent_scale=1)

@@ -27,6 +27,7 @@ def ran(cache, pipeline, tmp_path_factory):
     return code, out, json.loads((out / "results.json").read_text())
 
 
+@pytest.mark.slow
 def test_every_figure_is_written_and_the_page_shows_it(ran):
     code, out, found = ran
     assert code == 0

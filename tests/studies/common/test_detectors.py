@@ -13,7 +13,13 @@ from studies.common.detectors import (
 from tests.studies.common.test_plain_detectors import waves
 
 
-@pytest.mark.parametrize("name", DETECTORS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if "autoencoder" in name else [])
+        for name in DETECTORS
+    ],
+)
 def test_louder_noise_is_found_and_the_seed_gives_the_scores(name):
     training, nominal, noisy = waves(200, 0), waves(40, 3), waves(40, 1, noise_sd=0.4)
     first, again, other = (DETECTORS[name](seed).fit(training) for seed in (3, 3, 4))

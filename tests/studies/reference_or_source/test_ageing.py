@@ -50,6 +50,7 @@ def cells():
     return [cell_of(f"{group}{seed}", group, seed) for group in "ab" for seed in range(3)]
 
 
+@pytest.mark.slow
 def test_a_reference_finds_lost_capacity_and_seldom_a_fresh_cell(cells):
     table = pd.DataFrame(ageing.ageing_rows(cells))
     rows = table[(table["use"] == uses.REFERENCE) & (table["simulator"] == "circuit, fitted")]
