@@ -83,25 +83,26 @@ def measurements(table: pd.DataFrame, claim: str) -> pd.DataFrame:
 
 
 def verdicts(
-    table: pd.DataFrame, factor: float = AS_FIXED, claims: Sequence[Claim] = CLAIMS
+    table: pd.DataFrame, factors: Sequence[float] = (AS_FIXED,), claims: Sequence[Claim] = CLAIMS
 ) -> pd.DataFrame:
     """The verdict on each claim in each run.
 
     Args:
         table: The table of `run.collect`.
-        factor: By which the distance of each limit from its ideal is multiplied.
+        factors: By which the distance of each limit from its ideal is multiplied.
         claims: The claims with their limits.
 
     Returns:
-        Columns `reading`, `rounding`, `seed`, `claim` and `verdict`, without claims that were not
-        measured.
+        Columns `reading`, `rounding`, `seed`, `claim`, `factor` and `verdict`, without claims that
+        were not measured.
     """
     rows = [
-        (*run, claim.id, verdict(claim.limits, measured, factor))
+        (*run, claim.id, factor, verdict(claim.limits, measured, factor))
         for claim in claims
         for run, measured in measurements(table, claim.id).to_dict("index").items()
+        for factor in factors
     ]
-    return pd.DataFrame(rows, columns=[*KEYS, "claim", "verdict"])
+    return pd.DataFrame(rows, columns=[*KEYS, "claim", "factor", "verdict"])
 
 
 def num_runs(table: pd.DataFrame, reading: str) -> int:
@@ -136,7 +137,8 @@ def decide(table: pd.DataFrame, claim: Claim) -> dict[str, Any]:
         undecided claim, or None.
     """
     factors = {HALVED: "limits halved", AS_FIXED: "", DOUBLED: "limits doubled"}
-    of_factor = {factor: verdicts(table, factor, [claim]) for factor in factors}
+    found = verdicts(table, list(factors), [claim])
+    of_factor = {factor: found[found["factor"] == factor] for factor in factors}
     of_column = {name: counts(of_factor[AS_FIXED], name, claim.id) for name in DECIDING}
     given = {
         (column, factor): agreed(counts(found, column, claim.id))
@@ -213,8 +215,7 @@ def signs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
             for claim in CLAIMS
             if claim.is_tested and claim is not sixth
         ]
-        for factor in factors
-        for found in [verdicts(table, factor)]
+        for factor, found in verdicts(table, factors).groupby("factor")
         for column in columns
     }
     rows = []
@@ -222,10 +223,8 @@ def signs(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         claim = Claim(**vars(sixth) | {"limits": limits})
         row = [words]
         for column in columns:
-            given = [
-                counts(verdicts(table[table["reading"] == column], factor, [claim]), column, "C6")
-                for factor in factors
-            ]
+            found = verdicts(table[table["reading"] == column], factors, [claim])
+            given = [counts(each, column, "C6") for _, each in found.groupby("factor")]
             holds = [str(each[REPRODUCED] + each[PARTLY]) for each in given]
             reached = [
                 title([*others[column, factor], agreed(each)])
@@ -351,12 +350,8 @@ def shares(table: pd.DataFrame) -> pd.DataFrame:
     Returns:
         Columns `column`, `claim`, `factor` and one for each of `VERDICTS`.
     """
-    rows = []
-    for factor in np.geomspace(0.25, 4, 33):
-        found = verdicts(table, float(factor))
-        for column in DECIDING:
-            for claim in CLAIMS:
-                given = counts(found, column, claim.id)
-                part = [given[each] / max(given.total(), 1) for each in VERDICTS]
-                rows.append((column, claim.id, factor, *part))
-    return pd.DataFrame(rows, columns=["column", "claim", "factor", *VERDICTS])
+    found = verdicts(table[table["reading"].isin(DECIDING)], np.geomspace(0.25, 4, 33))
+    keys = ["reading", "claim", "factor"]
+    given = found.groupby(keys)["verdict"].value_counts(normalize=True).unstack(fill_value=0)
+    given = given.reindex(columns=VERDICTS, fill_value=0)
+    return given.reset_index().rename(columns={"reading": "column"})
