@@ -7,7 +7,7 @@ import pandas as pd
 from scipy.stats import mannwhitneyu
 
 from studies.author_code.run import EXTRACTED, KEYS, WHITE
-from studies.readings.run import AUTHOR, CONTROLS
+from studies.readings.run import AUTHOR, CONTROLS, ROUNDINGS
 
 _WHITE, _DEMO, _LONG = CONTROLS
 READING_OF = {
@@ -31,7 +31,8 @@ MEASURED = {
 
 
 def pairs(his: pd.DataFrame, ours: pd.DataFrame) -> pd.DataFrame:
-    """The values of both, one row for each kind of run, measurement and seed.
+    """The values of both, one row for each kind of run, measurement and seed. Of several roundings
+    of ours, it is the first one: runs of one seed are not independent.
 
     Args:
         his: The table of `run.collect`.
@@ -41,7 +42,11 @@ def pairs(his: pd.DataFrame, ours: pd.DataFrame) -> pd.DataFrame:
         Columns `kind`, `claim`, `name`, `whose` (`his` or `ours`), `seed` and `value`.
     """
     kinds = {reading: kind for kind, reading in READING_OF.items()}
-    ours = ours[ours["reading"].isin(kinds) & (ours["rounding"] == "oneDNN")]
+    ours = ours[ours["reading"].isin(kinds)]
+    first = ours.groupby(["reading", "seed"])["rounding"].transform(
+        lambda given: min(given, key=list(ROUNDINGS).index)
+    )
+    ours = ours[ours["rounding"] == first]
     both = {
         "his": his.assign(kind=list(zip(*(his[key] for key in KEYS[:3]), strict=True))),
         "ours": ours.assign(kind=ours["reading"].map(kinds)),

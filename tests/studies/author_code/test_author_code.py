@@ -102,7 +102,10 @@ def table(keys, rows):
 
 def test_the_table_has_medians_ranges_and_the_exact_test_of_both():
     his = table(KEYS, [(EXTRACTED, "4", 1_000, seed, seed) for seed in range(4)])
-    author = [("author's configuration", "oneDNN", seed, 10 + seed) for seed in range(4)]
+    author = [
+        ("author's configuration", "oneDNN" if seed < 3 else "Eigen", seed, 10 + seed)
+        for seed in range(4)
+    ]
     others = [("author's configuration", "Eigen", 0, 99), ("base", "oneDNN", 0, 99)]
     ours = table(["reading", "rounding", "seed"], author + others)
     header, rows = beside(his, ours)
