@@ -330,7 +330,9 @@ def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     """
     claims = [claim.id for claim in CLAIMS]
     rows = []
-    for reading, runs in found.groupby("reading", sort=False):
+    of_reading = dict(iter(found.groupby("reading")))
+    for reading in sorted(of_reading, key=list(READINGS).index):
+        runs = of_reading[reading]
         row = [reading, str(len(runs[["rounding", "seed"]].drop_duplicates()))]
         for claim in claims:
             given = counts(runs, reading, claim) if touches(reading, claim) else None
