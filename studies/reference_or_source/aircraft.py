@@ -1,6 +1,4 @@
-"""An A320 and its coarse simulators, from the same model with wrong parameters to a point mass, for
-the study.
-"""
+"""An A320 and its coarse simulator, a point mass, for the study."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -15,29 +13,10 @@ from studies.reference_or_source.aircraft_faults import (
     Fault,
     sizes_over_flight,
 )
-from studies.reference_or_source.aircraft_flight import Vehicle, draw_wind, fly, import_jsbsim
+from studies.reference_or_source.aircraft_flight import draw_wind, fly, import_jsbsim
 from studies.reference_or_source.aircraft_point_mass import Constants, simulate
 
 COMMANDS = ("target altitude", "target airspeed")
-VEHICLES = {
-    "own": Vehicle(),
-    "off 10 %": Vehicle(fuel=1.1, thrust=1.1, drag=1.1, elevator=0.9, gains=0.9),
-    "off 30 %": Vehicle(fuel=1.3, thrust=1.3, drag=1.3, elevator=0.7, gains=0.7),
-}
-"""The coarse simulators in JSBSim. The signs are fixed.
-
-| quantity | real | assumed when off by 10 % (30 % alike) |
-|---|---|---|
-| fuel at the start | 30,000 lb of 141,000 lb | 33,000 lb |
-| thrust at equal N1 | 1 | 1.1 |
-| drag coefficient at zero lift | 0.016 | 0.0176 |
-| elevator's deflection | 1 | 0.9 |
-| gains of the autopilot | 1 | 0.9 |
-"""
-POINT_MASSES = {"wrong physics": True, "missing state": False}
-"""The point masses, and whether the climb rate has its lag: without it a run changes more than
-without that of airspeed or N1.
-"""
 NOISE_SD = (0.5, 30.0, 0.05, 0.1, 0.1, 6.0)
 """Standard deviation of each channel's sensor noise, in the channel's unit."""
 RESOLUTION = (0.25, 16.0, 0.05, 0.1, 0.1, 4.0)
@@ -64,7 +43,6 @@ class Aircraft:
     unit_samples = UNIT_SAMPLES
     onset = ONSET
     window = 120
-    simulators = (*VEHICLES, *POINT_MASSES)
     faults: tuple[Fault, ...] = ALL
     parameters = tuple(field.name for field in dataclasses.fields(Constants))
     """Parameters of the point mass that can be fitted to telemetry."""
@@ -121,57 +99,34 @@ class Aircraft:
             if rng is None
             else [draw_wind(own) for own in rng.spawn(len(flights))]
         )
-        return [_fly_all(flights, Vehicle(), fault, winds) for fault in faults]
-
-    def run_coarse(
-        self,
-        simulator: str,
-        commands: np.ndarray,
-        faults: Sequence[Fault | None] = (None,),
-        values: Sequence[float] | None = None,
-    ) -> list[np.ndarray]:
-        """Runs a coarse simulator, in calm air.
-
-        Args:
-            simulator: One of `simulators`.
-            commands: Targets, see `draw_commands`.
-            faults: Faults, each of which acts as far as the simulator can express it; None for
-                nominal.
-            values: Values of `parameters` of a point mass; None: those of textbooks.
-
-        Returns:
-            For each fault, columns `coarse_columns`: the channels as the simulator computes them,
-            then the commands; float32 of shape `(samples, 8)`.
-
-        Raises:
-            InputError: If JSBSim is not installed although the simulator needs it.
-        """
-        flights = _as_flights(commands)
         found = []
         for fault in faults:
-            if simulator in VEHICLES:
-                run = _fly_all(flights, VEHICLES[simulator], fault, [None] * len(flights))
-            else:
-                constants = Constants() if values is None else Constants(*map(float, values))
-                run = simulate(
-                    flights, sizes_over_flight(fault), POINT_MASSES[simulator], constants
-                ).reshape(-1, len(self.channels))
-            found.append(np.concatenate([run, commands], axis=1).astype(np.float32))
+            sizes = sizes_over_flight(fault)
+            # each flight has a simulator of its own, so that none depends on the ones before it
+            runs = [fly(*each, sizes) for each in zip(flights, winds, strict=True)]
+            found.append(np.concatenate(runs).astype(np.float32))
         return found
 
-    def can_simulate(self, simulator: str, kind: str) -> bool:
-        """Returns whether a coarse simulator can express a kind of fault: a point mass has no
-        elevator.
-        """
-        return simulator in VEHICLES or kind != "elevator"
+    def run_coarse(self, commands: np.ndarray, values: Sequence[float]) -> np.ndarray:
+        """Runs the coarse simulator, in calm air and without a fault.
 
-    def measure(
-        self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0
-    ) -> np.ndarray:
-        """Measures channels of shape `(samples, 6)` with sensors that add white noise, times
-        `scale`, and round; returns float32.
+        Args:
+            commands: Targets, see `draw_commands`.
+            values: Values of `parameters`, such as `first_values`.
+
+        Returns:
+            Columns `coarse_columns`: the channels as the simulator computes them, then the
+            commands; float32 of shape `(samples, 8)`.
         """
-        return measure(values, scale * np.array(NOISE_SD), np.array(RESOLUTION), rng)
+        run = simulate(_as_flights(commands), Constants(*map(float, values)))
+        run = run.reshape(-1, len(self.channels))
+        return np.concatenate([run, commands], axis=1).astype(np.float32)
+
+    def measure(self, values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Measures channels of shape `(samples, 6)` with sensors that add white noise and round;
+        returns float32.
+        """
+        return measure(values, np.array(NOISE_SD), np.array(RESOLUTION), rng)
 
 
 def _draw_target(
@@ -197,15 +152,3 @@ def _draw_target(
 def _as_flights(commands: np.ndarray) -> np.ndarray:
     """Commands as `(flights, UNIT_SAMPLES, 2)`."""
     return commands.astype(float).reshape(-1, UNIT_SAMPLES, len(COMMANDS))
-
-
-def _fly_all(
-    flights: np.ndarray, vehicle: Vehicle, fault: Fault | None, winds: list[np.ndarray | None]
-) -> np.ndarray:
-    """Runs JSBSim over flights, each with a simulator of its own, so that no flight depends on the
-    ones before it.
-    """
-    sizes = sizes_over_flight(fault)
-    return np.concatenate(
-        [fly(targets, vehicle, sizes, wind) for targets, wind in zip(flights, winds, strict=True)]
-    ).astype(np.float32)

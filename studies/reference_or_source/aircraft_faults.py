@@ -1,6 +1,4 @@
-"""Faults of the aircraft and their course over a flight, which the fine and the coarse simulators
-share.
-"""
+"""Faults of the aircraft and their course over a flight."""
 
 import numpy as np
 

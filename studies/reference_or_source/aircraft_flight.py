@@ -7,7 +7,6 @@ elevator. The airspeed error gives a throttle, with a lead for the climb. It fli
 of its sensors.
 """
 
-import dataclasses
 import functools
 import itertools
 import math
@@ -31,11 +30,9 @@ _CLIMB_S = 3.0
 _SEEN_S = 1.0
 _MOST_SPEED_ERROR = 8.0  # knots, to which the throttle answers
 _STEPS_A_CONTROL = 3  # 30 steps of the simulator a second
-# of each tank and of the wing, as in JSBSim's description of the A320
-_FUEL_LB = 15_000.0
+# as in JSBSim's description of the A320
 _WING_SQFT = 1_317.0
 _DRAG_OF_SPEEDBRAKE = 0.04  # drag coefficient of the whole speed brake, which stands for other drag
-_DRAG_AT_ZERO_LIFT = 0.016
 # standard deviation in feet a second and correlation time in seconds, along and vertical
 _WINDS = ((1.0, 8.0), (0.8, 4.0))
 
@@ -47,25 +44,6 @@ _WRITTEN = (
     "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/throttle-cmd-norm[0]", "fcs/throttle-cmd-norm[1]", "atmosphere/gust-north-fps",
     "atmosphere/gust-down-fps",
 )  # fmt: skip
-
-
-@dataclasses.dataclass(frozen=True)
-class Vehicle:
-    """How an A320 differs from JSBSim's description of it.
-
-    Args:
-        fuel: Fuel at the start, as a share of the published 30,000 lb.
-        thrust: Thrust at equal N1, as a share.
-        drag: Drag at zero lift, as a share, at least 1.
-        elevator: Deflection of the elevator, as a share.
-        gains: Gains of the autopilot, as a share.
-    """
-
-    fuel: float = 1.0
-    thrust: float = 1.0
-    drag: float = 1.0
-    elevator: float = 1.0
-    gains: float = 1.0
 
 
 @functools.cache
@@ -106,17 +84,14 @@ def draw_wind(rng: np.random.Generator) -> np.ndarray:
     )
 
 
-def fly(
-    targets: np.ndarray, vehicle: Vehicle, sizes: dict[str, np.ndarray], wind: np.ndarray | None
-) -> np.ndarray:
+def fly(targets: np.ndarray, wind: np.ndarray | None, sizes: dict[str, np.ndarray]) -> np.ndarray:
     """Simulates one flight, which starts trimmed at its first targets.
 
     Args:
         targets: Altitude in feet and airspeed in knots, shape `(UNIT_SAMPLES, 2)`; each holds for
             the second after its sample.
-        vehicle: The aircraft.
-        sizes: Size of every fault at every sample, see `sizes_over_flight`.
         wind: As `draw_wind` returns it; None for calm air.
+        sizes: Size of every fault at every sample, see `sizes_over_flight`.
 
     Returns:
         Airspeed as it reads in knots, climb rate in feet a minute, pitch in degrees, N1 left and
@@ -126,7 +101,7 @@ def fly(
     Raises:
         InputError: If JSBSim is not installed, or cannot trim the aircraft at the first targets.
     """
-    model = _trimmed(*targets[0].tolist(), vehicle)
+    model = _trimmed(*targets[0].tolist())
     nodes = model.get_property_manager()
     (
         altitude,
@@ -144,7 +119,7 @@ def fly(
     put_elevator, put_aileron, put_left, put_right, put_along, put_down = (
         nodes.get_node(name).set_double_value for name in _WRITTEN
     )
-    trimmed_elevator = model["fcs/pitch-trim-cmd-norm"] / vehicle.elevator
+    trimmed_elevator = model["fcs/pitch-trim-cmd-norm"]
     trimmed_throttle = model["fcs/throttle-cmd-norm"]
     # the elevator's command holds the trim, so that a fault of the elevator reaches it
     model["fcs/pitch-trim-cmd-norm"] = 0.0
@@ -153,7 +128,6 @@ def fly(
     seen_speed = airspeed()
     wanted_climb = path_sum = speed_sum = 0.0
     dt = 1 / CONTROLS_A_SECOND
-    gains = vehicle.gains
     found = np.empty((UNIT_SAMPLES, 6))
     winds = itertools.repeat((0.0, 0.0)) if wind is None else iter(wind.tolist())
     for sample, (target_altitude, target_speed) in enumerate(targets.tolist()):
@@ -166,28 +140,26 @@ def fly(
             n1_right(),
             altitude(),
         )
-        _apply(model, vehicle, size, size["icing"] - sizes["icing"][max(sample - 1, 0)])
+        _apply(model, size, size["icing"] - sizes["icing"][max(sample - 1, 0)])
         for _ in range(CONTROLS_A_SECOND):
-            wanted = _limit(gains * (target_altitude - altitude()) / _ALTITUDE_S, MOST_CLIMB)
+            wanted = _limit((target_altitude - altitude()) / _ALTITUDE_S, MOST_CLIMB)
             wanted_climb += (wanted - wanted_climb) * dt / _CLIMB_S
             speed = true_speed()
             path_error = (wanted_climb - climb()) / speed
             path_sum += path_error * dt
             wanted_pitch = (
-                trimmed_pitch + wanted_climb / speed + gains * (0.5 * path_error + 0.15 * path_sum)
+                trimmed_pitch + wanted_climb / speed + (0.5 * path_error + 0.15 * path_sum)
             )
-            wanted_elevator = trimmed_elevator + gains * (
+            wanted_elevator = trimmed_elevator + (
                 3.0 * (pitch() - wanted_pitch) + 3.0 * pitch_rate()
             )
-            put_elevator(vehicle.elevator * (1 - size["elevator"]) * wanted_elevator)
+            put_elevator((1 - size["elevator"]) * wanted_elevator)
             put_aileron(-roll() - roll_rate() - 0.5 * math.sin(heading()))
             seen_speed += (airspeed() + size["pitot"] - seen_speed) * dt / _SEEN_S
             wanted_speed += _limit(target_speed - wanted_speed, MOST_ACCELERATION * dt)
             speed_error = _limit(wanted_speed - seen_speed, _MOST_SPEED_ERROR)
             throttle = (
-                trimmed_throttle
-                + gains * (0.025 * speed_error + 0.0025 * speed_sum)
-                + 0.009 * wanted_climb
+                trimmed_throttle + (0.025 * speed_error + 0.0025 * speed_sum) + 0.009 * wanted_climb
             )
             if 0 < throttle < 1:  # the sum waits while the throttle is at its stop
                 speed_sum += speed_error * dt
@@ -207,7 +179,7 @@ def _limit(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 
-def _trimmed(altitude_ft: float, airspeed_kt: float, vehicle: Vehicle) -> Any:
+def _trimmed(altitude_ft: float, airspeed_kt: float) -> Any:
     """Returns a simulator of its own, so that flights are independent, that is trimmed for level
     flight to the north.
     """
@@ -223,17 +195,10 @@ def _trimmed(altitude_ft: float, airspeed_kt: float, vehicle: Vehicle) -> Any:
         "ic/psi-true-deg": 0.0,
     }
     gear = {"gear/gear-cmd-norm": 0.0, "gear/gear-pos-norm": 0.0}
-    drag = dict.fromkeys(
-        ("fcs/speedbrake-cmd-norm", "fcs/speedbrake-pos-norm"),
-        _more_drag(vehicle) / _DRAG_OF_SPEEDBRAKE,
-    )
-    fuel = {f"propulsion/tank[{side}]/contents-lbs": vehicle.fuel * _FUEL_LB for side in (0, 1)}
-    for name, value in (start | gear | drag | fuel).items():
+    for name, value in (start | gear).items():
         model[name] = value
     model.run_ic()
     model["propulsion/set-running"] = -1
-    for side in (0, 1):
-        model[f"propulsion/engine[{side}]/bleed-factor"] = 1 - vehicle.thrust
     try:
         model["simulation/do_simple_trim"] = 1
     except jsbsim.TrimFailureError:
@@ -244,21 +209,12 @@ def _trimmed(altitude_ft: float, airspeed_kt: float, vehicle: Vehicle) -> Any:
     return model
 
 
-def _more_drag(vehicle: Vehicle) -> float:
-    """Returns the drag coefficient that the vehicle has more than JSBSim's A320."""
-    return (vehicle.drag - 1) * _DRAG_AT_ZERO_LIFT
-
-
-def _apply(model: Any, vehicle: Vehicle, size: dict[str, float], new_ice: float) -> None:
+def _apply(model: Any, size: dict[str, float], new_ice: float) -> None:
     """Sets what faults of these sizes change in the simulator beside its controls."""
     for side in (0, 1):
-        model[f"propulsion/engine[{side}]/bleed-factor"] = 1 - vehicle.thrust * (
-            1 - size["both engines"]
-        )
+        model[f"propulsion/engine[{side}]/bleed-factor"] = size["both engines"]
         if new_ice:  # the tanks carry its weight: JSBSim's A320 has no other weight that can change
             model[f"propulsion/tank[{side}]/contents-lbs"] += new_ice * ICE_LB / 2
     model["propulsion/tank[0]/external-flow-rate-pps"] = -size["fuel leak"]
     model["metrics/Sw-sqft"] = _WING_SQFT * (1 - size["icing"])
-    model["fcs/speedbrake-cmd-norm"] = (
-        _more_drag(vehicle) + size["icing"] * ICE_DRAG
-    ) / _DRAG_OF_SPEEDBRAKE
+    model["fcs/speedbrake-cmd-norm"] = size["icing"] * ICE_DRAG / _DRAG_OF_SPEEDBRAKE

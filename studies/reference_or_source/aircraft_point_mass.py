@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from studies.reference_or_source.aircraft_faults import ICE_DRAG, ICE_LB, UNIT_SAMPLES
+from studies.reference_or_source.aircraft_faults import UNIT_SAMPLES
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,57 +49,38 @@ _KNOT = 1.6878
 _AIR = 0.0023769
 
 
-def simulate(
-    targets: np.ndarray,
-    sizes: dict[str, np.ndarray],
-    has_climb_lag: bool = True,
-    constants: Constants = Constants(),
-) -> np.ndarray:
+def simulate(targets: np.ndarray, constants: Constants) -> np.ndarray:
     """Simulates flights, each of which starts level at its first targets.
 
     Args:
         targets: Altitude in feet and airspeed in knots, shape `(flights, UNIT_SAMPLES, 2)`.
-        sizes: Size of every fault at every sample of a flight, see `sizes_over_flight`; the
-            elevator's is ignored.
-        has_climb_lag: Whether the climb rate follows the wanted one with a lag, or at once.
         constants: Its constants.
 
     Returns:
         The channels of the aircraft, shape `(flights, UNIT_SAMPLES, 6)`.
     """
     lags = np.array([constants.climb_s, constants.speed_s, constants.engine_s])
-    keeps_climb, keeps_speed, keeps_engine = np.exp(-1 / lags) * [has_climb_lag, 1, 1]
-    leaked = np.cumsum(sizes["fuel leak"])
+    keeps_climb, keeps_speed, keeps_engine = np.exp(-1 / lags)
     altitude, airspeed = targets[:, 0].T.astype(float)
     climb = np.zeros(len(targets))
     change = np.zeros(len(targets))
-    engines = None
     found = np.empty((*targets.shape[:2], 6))
     for sample in range(UNIT_SAMPLES):
-        pitot = sizes["pitot"][sample]
-        ice = sizes["icing"][sample]
-        weight = _WEIGHT_LB - leaked[sample] + ice * ICE_LB
         # as a share of that at sea level, in the standard atmosphere
         density = (1 - 6.8756e-6 * altitude) ** 4.2559
         pressure = 0.5 * _AIR * (airspeed * _KNOT) ** 2 * _WING_SQFT  # dynamic pressure and wing
         path = climb / (airspeed * _KNOT / np.sqrt(density))
-        lift = weight / pressure
-        drag = (
-            constants.drag + ice * ICE_DRAG + lift**2 / (np.pi * _ASPECT_RATIO * _SPAN_EFFICIENCY)
-        )
-        force = drag * pressure + weight * (path + change * _KNOT / np.sqrt(density) / _GRAVITY)
-        at_full = _THRUST_LB * density * (1 - sizes["both engines"][sample])
-        shares = np.array([1 - sizes["left engine"][sample], 1.0])
-        throttle = np.minimum(np.sqrt(np.maximum(force, 0) / at_full * 2 / (shares**2).sum()), 1.0)
-        wanted_engines = _IDLE_N1 + (100 - _IDLE_N1) * throttle * shares[:, None]
-        engines = (
-            wanted_engines
-            if engines is None
-            else wanted_engines + (engines - wanted_engines) * keeps_engine
-        )
-        pitch = path + lift / (1 - ice) / _LIFT_SLOPE + _ZERO_LIFT_PITCH
+        lift = _WEIGHT_LB / pressure
+        drag = constants.drag + lift**2 / (np.pi * _ASPECT_RATIO * _SPAN_EFFICIENCY)
+        force = drag * pressure + _WEIGHT_LB * (path + change * _KNOT / np.sqrt(density) / _GRAVITY)
+        throttle = np.minimum(np.sqrt(np.maximum(force, 0) / (_THRUST_LB * density)), 1.0)
+        wanted_engines = _IDLE_N1 + (100 - _IDLE_N1) * throttle
+        if sample == 0:
+            engines = wanted_engines
+        engines = wanted_engines + (engines - wanted_engines) * keeps_engine
+        pitch = path + lift / _LIFT_SLOPE + _ZERO_LIFT_PITCH
         found[:, sample] = np.stack(
-            [airspeed + pitot, 60 * climb, np.rad2deg(pitch), *engines, altitude], axis=1
+            [airspeed, 60 * climb, np.rad2deg(pitch), engines, engines, altitude], axis=1
         )
 
         wanted_climb = np.clip(
@@ -107,6 +88,6 @@ def simulate(
         )
         climb = wanted_climb + (climb - wanted_climb) * keeps_climb
         altitude = altitude + climb
-        change = (targets[:, sample, 1] - airspeed - pitot) * (1 - keeps_speed)
+        change = (targets[:, sample, 1] - airspeed) * (1 - keeps_speed)
         airspeed = airspeed + change
     return found

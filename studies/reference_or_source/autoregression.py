@@ -17,15 +17,11 @@ class Autoregression:
         order: Number of last samples.
         penalty: Penalty of the ridge regression, a factor of the mean square of a standardised
             column.
-        is_free: Whether a window is predicted from its first samples and the inputs alone, so that
-            a slow change cannot hide in the last samples; otherwise each sample is predicted from
-            the measured ones before it.
     """
 
-    def __init__(self, order: int, penalty: float, is_free: bool):
+    def __init__(self, order: int, penalty: float):
         self.order = order
         self.penalty = penalty
-        self.is_free = is_free
 
     def fit(self, telemetry: np.ndarray, inputs: np.ndarray) -> "Autoregression":
         """Fits nominal windows of shape `(windows, samples, channels)` and `(windows, samples,
@@ -47,17 +43,9 @@ class Autoregression:
         predicts, are left out.
         """
         values = np.asarray(telemetry, np.float64)
-        if not self.is_free:
-            rows, targets = self._rows(values, inputs)
-            return (targets - self._predict(rows)).reshape(len(values), -1, values.shape[2])
-        run = values.copy()
-        for place in range(self.order, values.shape[1]):
-            past = run[:, place - self.order : place].reshape(len(run), -1)
-            # a free run may diverge where the fit is unstable
-            run[:, place] = np.clip(
-                self._predict(np.concatenate([past, inputs[:, place]], axis=1)), -1e6, 1e6
-            )
-        return (values - run)[:, self.order :]
+        rows, targets = self._rows(values, inputs)
+        predicted = self._middle + (rows - self._mean) / self._scale @ self._weights
+        return (targets - predicted).reshape(len(values), -1, values.shape[2])
 
     def _rows(self, telemetry: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         values = np.asarray(telemetry, np.float64)
@@ -66,21 +54,16 @@ class Autoregression:
         rows = np.concatenate([*lags, inputs[:, order:]], axis=2)
         return rows.reshape(-1, rows.shape[2]), values[:, order:].reshape(-1, values.shape[2])
 
-    def _predict(self, rows: np.ndarray) -> np.ndarray:
-        return self._middle + (rows - self._mean) / self._scale @ self._weights
 
-
-def choose(
-    telemetry: np.ndarray, inputs: np.ndarray, folds: np.ndarray, is_free: bool
-) -> Autoregression:
+def choose(telemetry: np.ndarray, inputs: np.ndarray, folds: np.ndarray) -> Autoregression:
     """The order and penalty with the least error on folds that were not learnt; unfitted."""
     errors = {}
     for order in ORDERS:
         for penalty in PENALTIES:
-            model = Autoregression(order, penalty, is_free)
+            model = Autoregression(order, penalty)
             held_out = held_out_errors(model, telemetry, inputs, folds)
             errors[order, penalty] = float(np.mean(held_out[:, -telemetry.shape[1] // 2 :] ** 2))
-    return Autoregression(*min(errors, key=errors.__getitem__), is_free)
+    return Autoregression(*min(errors, key=errors.__getitem__))
 
 
 def held_out_errors(
@@ -89,7 +72,7 @@ def held_out_errors(
     """Errors of each window by a model like this one that has not learnt from its fold."""
 
     def errors(learnt: np.ndarray, held_out: np.ndarray) -> np.ndarray:
-        fitted = Autoregression(model.order, model.penalty, model.is_free)
+        fitted = Autoregression(model.order, model.penalty)
         fitted.fit(telemetry[learnt], inputs[learnt])
         return fitted.errors(telemetry[held_out], inputs[held_out])
 

@@ -1,6 +1,4 @@
-"""The battery of a satellite as a system of the study: three channels, driven by a known load, with
-coarse simulators from exact to crude.
-"""
+"""The battery of a satellite as a system of the study: three channels, driven by a known load."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -49,7 +47,6 @@ class Battery:
     window = 100
     onset = 0
     """First sample of each unit of a run under a fault from which the fault acts."""
-    simulators = {"wrong physics": COARSE}
     faults = ALL
     parameters = ("resistance", "lost_material", "lost_heat_transfer")
     """Parameters of the simulator with wrong physics that can be fitted to telemetry, all 0 in the
@@ -89,27 +86,17 @@ class Battery:
         """
         return self._run(VEHICLE, commands, faults)
 
-    def run_coarse(
-        self,
-        simulator: str,
-        commands: np.ndarray,
-        faults: Sequence[Fault | None] = (None,),
-        values: Sequence[float] | None = None,
-    ) -> list[np.ndarray]:
-        """Runs a coarse simulator, see `Aircraft.run_coarse`; `values` are those of `parameters`,
-        None those of the simulator.
+    def run_coarse(self, commands: np.ndarray, values: Sequence[float]) -> np.ndarray:
+        """Runs the coarse simulator, see `Aircraft.run_coarse`.
 
         Returns:
-            For each fault, float32 array of shape `(samples, 4)`: the channels and the load,
-            without the first orbit.
+            Float32 array of shape `(samples, 4)`: the channels and the load, without the first
+            orbit.
         """
-        model = self.simulators[simulator]
+        changed = dict(zip(self.parameters, map(float, values), strict=True))
+        (run,) = self._run(dataclasses.replace(COARSE, **changed), commands, (None,))
         load = commands[ORBIT_SAMPLES:].astype(np.float32)
-        if values is not None:
-            model = dataclasses.replace(
-                model, **dict(zip(self.parameters, map(float, values), strict=True))
-            )
-        return [np.concatenate([run, load], axis=1) for run in self._run(model, commands, faults)]
+        return np.concatenate([run, load], axis=1)
 
     def _run(
         self, model: Model, commands: np.ndarray, faults: Sequence[Fault | None]
@@ -117,15 +104,13 @@ class Battery:
         found = simulate_all(commands[:, 0], REGIMES["gentle"], faults, [model])
         return [runs[0][ORBIT_SAMPLES:] for runs in found]
 
-    def measure(
-        self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0
-    ) -> np.ndarray:
-        """Measures simulated channels of shape `(samples, 3)` with sensors whose noise is
-        multiplied by `scale`; returns float32.
+    def measure(self, values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Measures simulated channels of shape `(samples, 3)` with noisy sensors; returns
+        float32.
         """
         noise = (SENSOR_NOISE_V, SENSOR_NOISE_A, SENSOR_NOISE_C)
         step = (SENSOR_STEP_V, SENSOR_STEP_A, SENSOR_STEP_C)
         return np.stack(
-            [measure(values[:, each], scale * noise[each], step[each], rng) for each in range(3)],
+            [measure(values[:, each], noise[each], step[each], rng) for each in range(3)],
             axis=1,
         )

@@ -51,12 +51,12 @@ def record(
     # commands are drawn unit by unit, so that the first ones are those of `fit`
     few = counts["parameters"] * system.unit_samples
     measured = system.measure(arrays["fit/real"][:few], np.random.default_rng([seed, 50]))
-    values = fit_parameters(
+    fitted = fit_parameters(
         system, commands_of(system, "fit", counts["parameters"], seed), measured
     )
     for part, given in commands.items():
-        arrays[f"{part}/{CRUDE}"] = system.run_coarse(CRUDE, given)[0]
-        arrays[f"{part}/{FITTED}"] = system.run_coarse(CRUDE, given, values=values)[0]
+        arrays[f"{part}/{CRUDE}"] = system.run_coarse(given, system.first_values)
+        arrays[f"{part}/{FITTED}"] = system.run_coarse(given, fitted)
     save_arrays(folder, arrays, "runs")
 
 
@@ -93,7 +93,7 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
         return system.first_values + (moved - 1) * system.steps
 
     def errors(moved: np.ndarray) -> np.ndarray:
-        run = system.run_coarse(CRUDE, commands, values=values(moved))[0]
+        run = system.run_coarse(commands, values(moved))
         apart = (run[:, :number] - telemetry) / scale
         return (apart - apart.mean(axis=0)).ravel()  # detectors do not mind an offset either
 

@@ -39,7 +39,6 @@ KEPT = KeptTables(
         "cell",
     ),
     digits=4,
-    kind="study",
     command="python -m studies.reference_or_source",
     former=("alarms",),
 )

@@ -28,9 +28,8 @@ SOURCE = "source"
 NO_SIMULATOR = "no simulator"
 COMMANDS = "commands and sums"
 ONE_STEP = "autoregression with inputs"
-FREE_RUN = "autoregression with inputs, free run"
 OF_SIMULATOR = (REFERENCE, COARSE_REFERENCE, SOURCE)
-WITHOUT = (NO_SIMULATOR, COMMANDS, ONE_STEP, FREE_RUN)
+WITHOUT = (NO_SIMULATOR, COMMANDS, ONE_STEP)
 """Uses with a simulator, and those that need none."""
 
 
@@ -83,8 +82,7 @@ class Comparison:
             ),
             NO_SIMULATOR: lambda: (known.telemetry, tested.telemetry),
             COMMANDS: self._less_commands,
-            ONE_STEP: lambda: self._less_autoregression(False),
-            FREE_RUN: lambda: self._less_autoregression(True),
+            ONE_STEP: self._less_autoregression,
         }
         for use in (use for use in signals if use in uses):
             learnt, judged = signals[use]()
@@ -158,19 +156,16 @@ class Comparison:
             predict = fit(known.inputs, known.telemetry, known.starts)
             differences.append(tested.telemetry - predict(tested.inputs))
         chosen = np.argmin(errors, axis=0)
-        self.chosen_regressions = tuple(
-            list(regressions(known.inputs.shape[2]))[place] for place in chosen
-        )
         return tuple(
             np.stack([parts[place][:, :, channel] for channel, place in enumerate(chosen)], axis=2)
             for parts in (residuals, differences)
         )
 
-    def _less_autoregression(self, is_free: bool) -> tuple[np.ndarray, np.ndarray]:
+    def _less_autoregression(self) -> tuple[np.ndarray, np.ndarray]:
         """Errors of a vector autoregression with inputs on known and tested telemetry."""
         known = self.windows.known
         tested = self.windows.tested
-        model = autoregression.choose(known.telemetry, known.inputs, known.folds, is_free)
+        model = autoregression.choose(known.telemetry, known.inputs, known.folds)
         errors = autoregression.held_out_errors(model, known.telemetry, known.inputs, known.folds)
         model.fit(known.telemetry, known.inputs)
         return errors, model.errors(tested.telemetry, tested.inputs)

@@ -1,6 +1,4 @@
-"""Physical oracles of the aircraft and its coarse simulators. Those in JSBSim are skipped without
-it.
-"""
+"""Physical oracles of the aircraft and its coarse simulator. Those in JSBSim are skipped without it."""
 
 import functools
 import sys
@@ -17,7 +15,6 @@ from studies.reference_or_source.aircraft import Aircraft
 from studies.reference_or_source.aircraft_faults import (
     ALL,
     ONSET,
-    SIZES,
     UNIT_SAMPLES,
     Fault,
     sizes_over_flight,
@@ -26,7 +23,6 @@ from studies.reference_or_source.aircraft_faults import (
 AIRCRAFT = Aircraft()
 AIRSPEED, CLIMB, PITCH, LEFT, RIGHT, ALTITUDE = range(6)
 FOLDER = Path(__file__).parents[3] / "examples" / "aircraft"
-POINT_MASSES = "wrong physics", "missing state"
 LATE = slice(ONSET + 450, None)  # when the fine simulator has settled after a fault's onset
 
 
@@ -59,20 +55,19 @@ def test_level_flight_keeps_its_targets_and_takes_less_thrust_as_fuel_burns(calm
     assert np.abs(calm[:, ALTITUDE] - 12_000).max() < 2
     assert np.abs(calm[:, AIRSPEED] - 260).max() < 0.1
     assert -1.0 < calm[-1, LEFT] - calm[0, LEFT] < -0.1 and calm[-1, PITCH] < calm[0, PITCH]
-    # the same simulator
-    np.testing.assert_array_equal(AIRCRAFT.run_coarse("own", level)[0][:, :6], calm)
     first, again = (AIRCRAFT.run_real(level, rng=np.random.default_rng(1))[0] for _ in range(2))
     np.testing.assert_array_equal(first, again)
     assert 0.2 < (first - calm)[:, AIRSPEED].std() < 1  # light turbulence
 
 
-@pytest.mark.parametrize("simulator", ["off 30 %", *POINT_MASSES])
-def test_steps_of_the_targets_are_reached(request, simulator, level):
-    if simulator == "off 30 %":
-        request.getfixturevalue("jsbsim")
+def coarse_run(commands):
+    return AIRCRAFT.run_coarse(commands, AIRCRAFT.first_values)
+
+
+def test_steps_of_the_targets_are_reached(level):
     stepped = level.copy()
     stepped[100:, 0], stepped[600:, 1] = 13_000, 275
-    run = AIRCRAFT.run_coarse(simulator, stepped)[0]
+    run = coarse_run(stepped)
     np.testing.assert_array_equal(run[:, 6:], stepped)
     assert np.abs(run[:101, ALTITUDE] - 12_000).max() < 5 and abs(run[400, ALTITUDE] - 13_000) < 20
     assert abs(run[599, AIRSPEED] - 260) < 1 and abs(run[-1, AIRSPEED] - 275) < 1
@@ -118,33 +113,21 @@ def test_a_fault_changes_the_channels_that_physics_says_and_nothing_before(
         assert abs(change[channel]) < most, channel
 
 
-@pytest.mark.parametrize("kind", sorted(SIZES))
-def test_the_point_mass_expresses_the_faults_that_it_says(level, kind):
-    for simulator in POINT_MASSES:
-        nominal, faulty = (
-            AIRCRAFT.run_coarse(simulator, level, [fault])[0] for fault in (None, Fault(kind, 1.0))
-        )
-        assert AIRCRAFT.can_simulate(simulator, kind) == bool(np.any(nominal != faulty))
-        np.testing.assert_array_equal(nominal[:ONSET], faulty[:ONSET])
-    assert AIRCRAFT.can_simulate("off 30 %", kind)
-
-
 def test_lags_of_the_point_mass_have_their_closed_form(level):
     constants, commands = aircraft_point_mass.Constants(), level.copy()
     commands[100:] = 16_000, 275  # so far above that the climb rate stays at its limit for a minute
-    run, without = (AIRCRAFT.run_coarse(simulator, commands)[0] for simulator in POINT_MASSES)
+    run = coarse_run(commands)
     expected = 275 - 15 * np.exp(-np.arange(UNIT_SAMPLES - 100) / constants.speed_s)
     np.testing.assert_allclose(run[100:, AIRSPEED], expected, atol=1e-3)
     limit = 60 * aircraft_point_mass.MOST_CLIMB
     climb = limit * (1 - np.exp(-np.arange(60) / constants.climb_s))
     np.testing.assert_allclose(run[100:160, CLIMB], climb, rtol=1e-4, atol=1e-3)
-    np.testing.assert_allclose(without[101:160, CLIMB], limit, rtol=1e-6)
 
 
 def test_pitch_of_the_point_mass_in_level_flight_by_hand(level):
     lift = 141_000 / (0.5 * 0.0023769 * (260 * 1.6878) ** 2 * 1_317)  # lift coefficient
     by_hand = np.rad2deg(lift / (2 * np.pi * 9.4 / 11.4)) - 2
-    pitch = AIRCRAFT.run_coarse("wrong physics", level)[0][:, PITCH]
+    pitch = coarse_run(level)[:, PITCH]
     np.testing.assert_allclose(pitch, by_hand, rtol=1e-5)
 
 

@@ -45,19 +45,17 @@ def process(number, rng):
     return values, inputs
 
 
-@pytest.mark.parametrize("is_free", [False, True])
-def test_the_autoregression_recovers_a_known_process(is_free):
+def test_the_autoregression_recovers_a_known_process():
     values, inputs = process(60, np.random.default_rng(0))
-    model = Autoregression(1, 1e-4, is_free).fit(values, inputs)
+    model = Autoregression(1, 1e-4).fit(values, inputs)
     errors = model.errors(values, inputs)
     assert errors.shape == (60, 59, 2)
-    # a free run adds up the noise of a first-order process: 1 / sqrt(1 - .8 ** 2)
-    assert 0.009 < errors.std() < (0.02 if is_free else 0.0105)
+    assert 0.009 < errors.std() < 0.0105
 
 
 def test_order_and_penalty_are_chosen_on_folds_that_were_not_learnt():
     values, inputs = process(60, np.random.default_rng(0))
     folds = np.arange(60) % 3
-    model = choose(values, inputs, folds, is_free=False)
+    model = choose(values, inputs, folds)
     errors = held_out_errors(model, values, inputs, folds)
     assert errors[:, -30:].std() == pytest.approx(0.01, rel=0.05)

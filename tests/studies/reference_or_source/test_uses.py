@@ -7,7 +7,6 @@ from studies.reference_or_source.judging import NOMINAL, RATE, judged
 from studies.reference_or_source.recordings import FITTED, record
 from studies.reference_or_source.uses import (
     COMMANDS,
-    FREE_RUN,
     NO_SIMULATOR,
     ONE_STEP,
     REFERENCE,
@@ -50,7 +49,7 @@ def test_an_enhancer_leaves_the_noise_as_residual(windows):
 def found(windows):
     """Share of windows of the large offset, and of nominal ones, that each use flags."""
     large, shares = windows.faults.index(("offset", 1.0)), {}
-    uses = (REFERENCE, NO_SIMULATOR, SOURCE, COMMANDS, ONE_STEP, FREE_RUN)
+    uses = (REFERENCE, NO_SIMULATOR, SOURCE, COMMANDS, ONE_STEP)
     for scores in Comparison(windows, 0).scores(uses):
         if scores.detector == MAIN:
             alarms = scores.tested > conformal_threshold(scores.known, RATE)
@@ -61,7 +60,7 @@ def found(windows):
     return shares
 
 
-@pytest.mark.parametrize("use", [REFERENCE, COMMANDS, FREE_RUN])
+@pytest.mark.parametrize("use", [REFERENCE, COMMANDS])
 def test_what_is_expected_from_commands_shows_an_offset_that_telemetry_alone_does_not(found, use):
     assert found[use][0] == 1.0 and found[use][1] < 0.1
     assert found[NO_SIMULATOR][0] < 0.3 and found[SOURCE][0] < 0.3

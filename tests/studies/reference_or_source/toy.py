@@ -16,7 +16,6 @@ class Offset:
 class Toy:
     name, channels, interval_s, is_continuous = "toy", ("first", "second"), 1.0, False
     unit_samples, window, onset = 200, 20, 50
-    simulators = {"own": 2.0, "wrong physics": 1.0}
     faults = (Offset("offset", 0.5), Offset("offset", 1.0), Offset("silence", 1.0))
     parameters, first_values = ("gain",), np.array([1.0])
     steps, bounds = np.array([0.5]), ((-10.0,), (10.0,))
@@ -38,17 +37,13 @@ class Toy:
             for fault in faults
         ]
 
-    def run_coarse(self, simulator, commands, faults=(None,), values=None):
-        gain = self.simulators[simulator] if values is None else values[0]
-        clean = np.concatenate([gain * commands, -commands], axis=1)
-        return [
-            np.concatenate([self._faulty(clean, fault), commands.astype(np.float32)], axis=1)
-            for fault in faults
-        ]
+    def run_coarse(self, commands, values):
+        run = np.concatenate([values[0] * commands, -commands, commands], axis=1)
+        return run.astype(np.float32)
 
     def as_inputs(self, commands):
         return commands
 
-    def measure(self, values, rng, scale=1.0):
+    def measure(self, values, rng):
         common = rng.standard_normal((len(values), 1))  # noise that the channels share
-        return (values + scale * self.sd * common).astype(np.float32)
+        return (values + self.sd * common).astype(np.float32)
