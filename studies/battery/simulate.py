@@ -40,7 +40,6 @@ class Model:
         diffusion: Diffusivity of lithium in the negative electrode's particles, as a share of the
             published value.
         follows_ambient: Whether it knows the temperature of the regime.
-        is_isothermal: Whether the battery keeps its temperature.
     """
 
     physics: str = "SPM"
@@ -49,7 +48,6 @@ class Model:
     lost_heat_transfer: float = 0.0
     diffusion: float = 1.0
     follows_ambient: bool = False
-    is_isothermal: bool = False
 
 
 COARSE = Model()
@@ -182,12 +180,7 @@ def _build(
     values["Current function [A]"] = pybamm.Interpolant(clock, current, pybamm.t)
     build = getattr(pybamm.lithium_ion, model.physics)
     return pybamm.Simulation(
-        build(
-            {
-                "thermal": "isothermal" if model.is_isothermal else "lumped",
-                "contact resistance": "true",
-            }
-        ),
+        build({"thermal": "lumped", "contact resistance": "true"}),
         parameter_values=values,
         solver=pybamm.IDAKLUSolver(**_TOLERANCES, output_variables=[_VOLTAGE, _TEMPERATURE]),
         var_pts=_MESH,

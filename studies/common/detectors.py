@@ -15,7 +15,6 @@ from threadpoolctl import threadpool_limits
 from enhsim_tf.common.two_sample import window_features
 
 _WIDTH = 25  # samples of a moving deviation
-_MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` is fitted
 
 
 class Detector(Protocol):
@@ -90,18 +89,15 @@ class PCAResidual:
 
 
 class JointMeans:
-    """Mahalanobis distance of the means of all channels in so many equal parts of a window.
+    """Mahalanobis distance of the means of all channels of a window.
 
     A small change of one channel against the others is large where they hardly move apart
     otherwise; shrinkage of the covariance would hide it.
     """
 
-    def __init__(self, num_parts: int = 1):
-        self.num_parts = num_parts
-
     def fit(self, windows: np.ndarray) -> "JointMeans":
         """Estimates mean and covariance from nominal windows."""
-        means = self._means(windows)
+        means = np.mean(windows, axis=1, dtype=np.float64)
         self._mean = means.mean(axis=0)
         self._precision = np.linalg.pinv(np.atleast_2d(np.cov(means, rowvar=False)), hermitian=True)
         return self
@@ -110,13 +106,8 @@ class JointMeans:
         """Returns the squared distance of each window, divided by the number of means: about 1 for
         nominal windows.
         """
-        apart = self._means(windows) - self._mean
+        apart = np.mean(windows, axis=1, dtype=np.float64) - self._mean
         return np.einsum("wi,ij,wj->w", apart, self._precision, apart) / apart.shape[1]
-
-    def _means(self, windows: np.ndarray) -> np.ndarray:
-        values = np.asarray(windows, np.float64)
-        parts = np.array_split(values, min(self.num_parts, values.shape[1]), axis=1)
-        return np.concatenate([part.mean(axis=1, dtype=np.float64) for part in parts], axis=1)
 
 
 class _Control:
@@ -158,64 +149,6 @@ class MovingDeviation(_Control):
         sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0), (0, 0))), axis=2)
         mean, square = (sums[:, :, width:] - sums[:, :, :-width]) / width
         return np.sqrt(np.maximum(square - mean**2, 0).max(axis=(1, 2)))
-
-
-class Innovation:
-    """Size of what a linear prediction from so many past samples of all channels, less in short
-    windows, does not explain.
-
-    The prediction is a vector autoregression, fitted by ridge regression; errors are weighed by the
-    inverse of their covariance. A channel that loses its relation to the others, or follows them
-    with another delay, is found although its own values look as before.
-    """
-
-    def __init__(self, order: int = 48):
-        self.order = order
-
-    def fit(self, windows: np.ndarray) -> "Innovation":
-        """Fits the prediction and the covariance of its errors to nominal windows."""
-        values = np.asarray(windows, np.float64)
-        self._mean = values.mean(axis=(0, 1))
-        order = max(1, min(self.order, values.shape[1] // 4))
-        number = max(1, _MOST_ROWS // (values.shape[1] - order))
-        centred = (values - self._mean)[
-            np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)
-        ]
-        # (windows, places, channels, order + 1)
-        view = np.lib.stride_tricks.sliding_window_view(centred, order + 1, axis=1)
-        past = view[..., :-1].reshape(-1, centred.shape[2] * order)
-        now = view[..., -1].reshape(-1, centred.shape[2])
-        gram = past.T @ past
-        gram[np.diag_indices_from(gram)] += 1e-3 * np.trace(gram) / len(gram) + 1e-12
-        self._weights = np.linalg.solve(gram, past.T @ now)
-        errors = now - past @ self._weights
-        covariance = errors.T @ errors / len(errors)
-        covariance[np.diag_indices_from(covariance)] += (
-            1e-6 * np.trace(covariance) / len(covariance) + 1e-24
-        )
-        self._whiten = np.linalg.cholesky(np.linalg.inv(covariance))
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the mean square of the weighed errors of each window, about the number of
-        channels for nominal ones.
-        """
-        values = np.asarray(windows, np.float64) - self._mean
-        order = len(self._weights) // values.shape[2]
-        channels = values.shape[2]
-        # input, lag from the oldest, output
-        kernels = self._weights.reshape(channels, order, channels).astype(np.float32)
-        scores = np.empty(len(values))
-        step = max(1, 2_000_000 // (values.shape[1] * channels))
-        for first in range(0, len(values), step):
-            some = values[first : first + step].astype(np.float32)
-            errors = some[:, order:].copy()
-            for lag in range(order):
-                errors -= some[:, lag : lag - order] @ kernels[:, lag]
-            scores[first : first + step] = np.mean(
-                np.sum((errors @ self._whiten.astype(np.float32)) ** 2, axis=2), axis=1
-            )
-        return scores
 
 
 def features(windows: np.ndarray) -> np.ndarray:

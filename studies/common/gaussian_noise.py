@@ -14,7 +14,7 @@ CANDIDATES = (NONE, "gaussian", "autoregression", RESIDUAL_WINDOWS, MATCHED)
 _MOST_ORDER = 200  # of the autoregression
 
 
-def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> NoiseModel:
+def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> "GaussianNoise | NoiseModel":
     """Fits one of `CANDIDATES` to windows of noise and the enhanced signal below them, both of
     shape `(windows, samples, channels)`.
     """
@@ -76,18 +76,7 @@ class GaussianNoise:
         """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no
         effect.
         """
-        return self._draw((number, self.window), rng)
-
-    def generate_series(
-        self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples, channels)`. The signal
-        has no effect.
-        """
-        return self._draw((1, num_samples), rng)[0]
-
-    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-        draws = rng.standard_normal((*shape, len(self.root))) @ self.root.T
+        draws = rng.standard_normal((number, self.window, len(self.root))) @ self.root.T
         if self.processes:
             draws = np.stack(
                 [

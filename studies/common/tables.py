@@ -24,7 +24,6 @@ class KeptTables:
         digits: Decimals that numbers are rounded to.
         command: The command that produces them.
         digits_of: Decimals of tables that differ from `digits`.
-        kind: Word for messages.
         former: Names of tables that the command no longer makes, which are read where they are
             published.
     """
@@ -34,7 +33,6 @@ class KeptTables:
     digits: int
     command: str
     digits_of: Mapping[str, int] = dataclasses.field(default_factory=dict)
-    kind: str = "study"
     former: tuple[str, ...] = ()
 
     def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
@@ -66,7 +64,7 @@ class KeptTables:
         missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
         if missing:
             raise InputError(
-                f"Expected the tables of the {self.kind} in {folder}. Received: no "
+                f"Expected the tables of the study in {folder}. Received: no "
                 f"{missing[0]}.parquet. Run {self.command}."
             )
         there = [

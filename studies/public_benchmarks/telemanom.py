@@ -38,14 +38,6 @@ class LabelledChannel:
     test: Telemetry
     sequences: Ranges
 
-    @property
-    def is_anomalous(self) -> np.ndarray:
-        """Boolean array that marks the anomalous samples of the test part, shape `(samples,)`."""
-        marks = np.zeros(len(self.test), bool)
-        for start, stop in self.sequences:
-            marks[start:stop] = True
-        return marks
-
 
 def read_labels(folder: str | os.PathLike) -> dict[str, Ranges]:
     """Reads the label file. The sequences of all rows of a channel are combined, and overlapping

@@ -19,7 +19,6 @@ def test_gaussian_noise_of_several_channels_keeps_their_covariance():
     assert noise.shape == (500, 100, 3) and noise.dtype == np.float32
     generated = np.cov(noise.reshape(-1, 3), rowvar=False)
     assert generated == pytest.approx(found, abs=5 * 4 * np.sqrt(2 / 50_000))
-    assert fitted.generate_series(30, default_rng(1)).shape == (30, 3)
 
 
 def second_order(first, second, number, samples, seed):
@@ -89,7 +88,6 @@ def test_joint_autoregression_recovers_the_channels_and_their_cross_correlation(
     assert found == pytest.approx(expected, abs=0.01)
     sds = [2 / np.sqrt(1 - 0.81), 7 / np.sqrt(1 - 0.25)]
     assert noise.std(axis=(0, 1)) == pytest.approx(sds, rel=0.03)
-    assert fitted.generate_series(30, default_rng(1)).shape == (30, 2)
 
 
 def test_autoregressions_that_are_refused(refused):

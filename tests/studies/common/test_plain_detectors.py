@@ -4,19 +4,16 @@ import numpy as np
 import pytest
 
 from studies.common.detectors import (
-    Innovation,
     JointMeans,
     LargestStep,
     LimitCheck,
     MovingDeviation,
     PCAResidual,
 )
-from tests.scoring.test_views import vector_autoregression
 
 DETECTORS = {
     "limit check": LimitCheck,
     "PCA residual": lambda: PCAResidual(seed=0),
-    "innovation": Innovation,
     "largest step": LargestStep,
     "moving deviation": MovingDeviation,
 }
@@ -57,32 +54,6 @@ def test_an_anomaly_of_one_channel_of_several_is_found(name):
     changed[:, 20:60, 1] += np.random.default_rng(9).standard_normal((60, 40))
     scores, plain = detector.score(changed), detector.score(nominal)
     assert scores.shape == plain.shape == (60,) and area(scores, plain) > 0.95
-
-
-def process(seed):
-    return vector_autoregression(300, seed, 120) + [5.0, -30.0]
-
-
-def test_innovations_of_a_known_vector_autoregression_are_white_and_those_of_another_time_are_not():
-    detector = Innovation(order=2).fit(process(0))
-    fresh = process(1)
-    scores = detector.score(fresh)
-    assert scores.mean() == pytest.approx(2, rel=0.02)  # one for each channel
-    # of a mean of 118 sums of two squares
-    assert scores.std() == pytest.approx(np.sqrt(2 * 2 / 118), rel=0.15)
-    # every channel looks as before
-    swapped = np.stack([fresh[:, :, 0], np.roll(fresh[:, :, 1], 150, axis=0)], axis=2)
-    late = np.stack([fresh[:, :, 0], np.roll(fresh[:, :, 1], 30, axis=1)], axis=2)
-    for changed_relation in (swapped, late):
-        found = detector.score(changed_relation)
-        assert found.mean() > 3 and area(found, scores) > 0.999
-    limits = LimitCheck().fit(fresh)
-    assert area(limits.score(swapped), limits.score(fresh)) < 0.6
-
-
-def test_innovation_of_a_channel_that_is_a_copy_of_another_is_finite():
-    windows = waves(100, 0)[:, :, None] * np.ones(2)
-    assert np.isfinite(Innovation(4).fit(windows).score(windows)).all()
 
 
 # by hand

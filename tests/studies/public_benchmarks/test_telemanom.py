@@ -52,7 +52,7 @@ def test_channels_by_hand(make):
     assert (len(channel.test), channel.test.name) == (100, "B-2")
     assert not channel.test.clock.has_time
     # the file's ends are inside
-    assert np.flatnonzero(channel.is_anomalous).tolist() == [5, *range(70, 80)]
+    assert channel.sequences == ((5, 6), (70, 80))
     np.save(folder / "test" / "C-3.npy", np.arange(60))  # no commands, and shorter than its label
     channel = load_channel(folder, "C-3")
     assert channel.sequences == ((0, 60),) and channel.test.values[:, 0].tolist() == list(range(60))
