@@ -11,6 +11,7 @@ from studies.battery.orbits import REGIMES
 from studies.battery.simulate import import_pybamm
 from studies.common.replicates import run_study
 from studies.common.settings import Settings
+from studies.common.tables import stage_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,8 +40,6 @@ def tables_of_cell(
     """Simulates the runs of one seed in one regime with this version of PyBaMM, and judges
     detectors on them.
     """
-    import pandas as pd
-
     counts = {part: getattr(settings.battery, f"{part}_orbits") for part in record.PARTS}
 
     def simulate(folder: Path) -> None:
@@ -49,7 +48,7 @@ def tables_of_cell(
     simulated = f"battery {regime} {seed}"
     folder = stages.run(simulated, simulate, (counts, regime, seed, version))
 
-    def judge(found: Path) -> None:
+    def judge() -> dict[str, list[dict[str, Any]]]:
         from enhsim_tf.enhancer.candidates import choose_enhancer
         from studies.battery.detectors import Judge
 
@@ -59,13 +58,9 @@ def tables_of_cell(
             pairs.coarse, pairs.telemetry[:, :, None], pairs.starts, seed=seed
         ).enhancer.name
         one = Judge(runs, pairs, chosen, seed)
-        pd.DataFrame(one.source_rows() + one.reference_rows()).assign(
-            regime=regime, seed=seed
-        ).to_parquet(found / "alarms.parquet")
+        about = {"regime": regime, "seed": seed}
+        return {"alarms": [row | about for row in one.source_rows() + one.reference_rows()]}
 
-    return {
-        "alarms": pd.read_parquet(
-            stages.run(f"battery judged {regime} {seed}", judge, (regime, seed), [simulated])
-            / "alarms.parquet"
-        )
-    }
+    return stage_tables(
+        stages, f"battery judged {regime} {seed}", judge, (regime, seed), [simulated]
+    )

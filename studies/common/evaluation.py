@@ -10,6 +10,7 @@ gap between simulation and reality.
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from enhsim_tf.telemetry.windows import time_blocks
 from studies.common.detectors import Detector
 from studies.common.injections import DURATIONS, SEVERITIES, inject
 from studies.common.metrics import recall_at_real_rate
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _NUM_BLOCKS = 10  # consecutive blocks of time for which false alarms are counted separately
 
@@ -136,6 +140,19 @@ def evaluate_arm(
                 }
             )
     return tables
+
+
+def by_detector(tables: Mapping[str, list[dict]]) -> "pd.DataFrame":
+    """A row for each detector from what `evaluate_arm` returns: alarms and windows over all blocks
+    of time, and recall as the mean over kinds and severities.
+    """
+    import pandas as pd
+
+    alarms, recall = (
+        pd.DataFrame(tables[name]).groupby("detector", sort=False) for name in ("alarms", "recall")
+    )
+    counts = alarms[["alarms", "windows"]].sum()
+    return counts.join(recall[["recall", "recall_at_real_rate"]].mean()).reset_index()
 
 
 def cross_fitted_scores(

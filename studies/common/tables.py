@@ -1,17 +1,46 @@
-"""Tables of a study in compact files, small enough to be committed."""
+"""Tables of a study: as results of a stage, and in compact files, small enough to be committed."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.stages import Stages
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def stage_tables(
+    stages: Stages,
+    name: str,
+    compute: Callable[[], Mapping[str, Any]],
+    settings: Any,
+    after: Iterable[str] = (),
+    version: int = 1,
+) -> "dict[str, pd.DataFrame]":
+    """Computes tables in a stage, or finds them in the cache; see `Stages.run`.
+
+    Args:
+        stages: Runs stages and caches their results.
+        name: Name of the stage.
+        compute: Returns tables, or lists of their rows, by name.
+        settings: What the result depends on.
+        after: Names of the stages whose results `compute` reads.
+        version: Version of the code.
+    """
+    import pandas as pd
+
+    def make(folder: Path) -> None:
+        for table, rows in compute().items():
+            pd.DataFrame(rows).to_parquet(folder / f"{table}.parquet")
+
+    folder = stages.run(name, make, settings, after, version)
+    return {path.stem: pd.read_parquet(path) for path in sorted(folder.glob("*.parquet"))}
 
 
 @dataclasses.dataclass(frozen=True)

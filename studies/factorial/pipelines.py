@@ -16,6 +16,7 @@ from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.windows import random_window_starts
 from studies.common import detectors, evaluation
 from studies.common.gaussian_noise import GaussianNoise
+from studies.common.tables import stage_tables
 from studies.factorial.cells import (
     AUTOREGRESSION,
     DETECTORS,
@@ -80,21 +81,20 @@ class Pipelines:
         }
         found = []
         for name, cells in parts.items():
-            make = functools.partial(self._make, cells)
-            folder = self.stages.run(f"cells {name}", make, depends, ("telemetry",))
-            found.append(pd.read_parquet(folder / "cells.parquet"))
+            compute = functools.partial(self._rows, cells)
+            stage = f"cells {name}"
+            tables = stage_tables(self.stages, stage, compute, depends, ("telemetry",))
+            found.append(tables["cells"])
         return {"cells": pd.concat(found, ignore_index=True)}
 
-    def _make(self, cells: list[str | Cell], folder: Path) -> None:
-        import pandas as pd
-
+    def _rows(self, cells: list[str | Cell]) -> dict[str, list[dict[str, object]]]:
         about = {"environment": self.settings.noise, "seed": self.seed}
         rows = [
             {**about, "cell": getattr(cell, "name", cell), **row}
             for cell in cells
             for row in self.judged(cell)
         ]
-        pd.DataFrame(rows).to_parquet(folder / "cells.parquet")
+        return {"cells": rows}
 
     @functools.cached_property
     def _trial(self) -> evaluation.Trial:
@@ -107,22 +107,10 @@ class Pipelines:
             A row for each detector: alarms and windows over all blocks of time, and recall as the
             mean over kinds and severities.
         """
-        import pandas as pd
-
         makers = {name: detectors.DETECTORS[name] for name in DETECTORS}
         training, held_out = (self.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
         tables = evaluation.evaluate_arm(training, held_out, self._trial, makers, self.seed)
-        alarms, recall = (
-            pd.DataFrame(tables[name]).groupby("detector", sort=False)
-            for name in ("alarms", "recall")
-        )
-        rows = (
-            alarms[["alarms", "windows"]]
-            .sum()
-            .join(recall[["recall", "recall_at_real_rate"]].mean())
-            .reset_index()
-        )
-        return rows.to_dict("records")
+        return evaluation.by_detector(tables).to_dict("records")
 
     def arm(self, cell: str | Cell, purpose: str) -> np.ndarray:
         """Windows of a cell or of a reference, of shape `(windows, samples)`.

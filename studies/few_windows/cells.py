@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import zlib
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +21,7 @@ from studies.common.example import coarse_simulator, draw_noise
 from studies.common.injections import DURATIONS, inject
 from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import Settings
+from studies.common.tables import stage_tables
 from studies.few_windows.record import (
     CORAL,
     NOISE_MODELS,
@@ -114,8 +114,6 @@ class World:
         """The rows of all training data at a number of real windows, which are a stage of their
         own.
         """
-        import pandas as pd
-
         chosen = self.settings
         # which seeds are computed does not affect a cell
         same = dataclasses.replace(chosen.few_windows, num_seeds=0, first_seed=0)
@@ -127,16 +125,12 @@ class World:
             same,
             chosen.paper.false_alarm_rate,
         )
+        about = {"num_real": num_real, "seed": chosen.seed, "environment": chosen.noise}
 
-        def make(folder: Path) -> None:
-            about = {"num_real": num_real, "seed": chosen.seed, "environment": chosen.noise}
-            pd.DataFrame(self._rows(self.record(num_real))).assign(**about).to_parquet(
-                folder / "rows.parquet"
-            )
+        def compute() -> dict[str, list[dict]]:
+            return {"rows": [row | about for row in self._rows(self.record(num_real))]}
 
-        return pd.read_parquet(
-            stages.run(f"few windows {num_real}", make, depends) / "rows.parquet"
-        )
+        return stage_tables(stages, f"few windows {num_real}", compute, depends)["rows"]
 
     def _rows(self, record: Record) -> list[dict]:
         number = self.settings.few_windows.num_windows

@@ -6,7 +6,6 @@ the study of robustness.
 """
 
 import functools
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,7 @@ from studies.common import evaluation
 from studies.common.detectors import DETECTORS
 from studies.common.gaussian_noise import CANDIDATES, GaussianNoise, fit_candidate
 from studies.common.settings import Settings
+from studies.common.tables import stage_tables
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 from studies.noise_models.real_floor import RealFloor, Row
 from studies.noise_models.summary import KEPT, REAL
@@ -70,22 +70,19 @@ class Cell:
             chosen.noise_models,
         )
         depends = (chosen.paper.of("windows"), *counts)
-        parts: dict[str, list[pd.DataFrame]] = {name: [] for name in KEPT.names}
+        parts = []
         for model in (REAL, *MODELS):
             name = "noise model " + model.replace(" ", "_")
-            folder = self.stages.run(
-                name, functools.partial(self._make, model), (model, *depends), ("telemetry",)
+            compute = functools.partial(self._tables, model)
+            parts.append(
+                stage_tables(self.stages, name, compute, (model, *depends), ("telemetry",))
             )
-            for table, found in parts.items():
-                found.append(pd.read_parquet(folder / f"{table}.parquet"))
         return {
-            name: pd.concat([each for each in found if len(each)], ignore_index=True)
-            for name, found in parts.items()
+            name: pd.concat([part[name] for part in parts], ignore_index=True)
+            for name in KEPT.names
         }
 
-    def _make(self, model: str, folder: Path) -> None:
-        import pandas as pd
-
+    def _tables(self, model: str) -> "dict[str, pd.DataFrame]":
         floor, held_out = self._floor()
         if model == REAL:
             number = self.settings.robustness.num_windows
@@ -96,14 +93,9 @@ class Cell:
             compared = [held_out]
         else:
             arms, compared = self._generated(model, len(held_out))
-        for name, rows in {
-            "detectors": self._detected(arms),
-            "realism": _measured(floor, compared),
-        }.items():
-            table = pd.DataFrame(rows).assign(
-                family=self.settings.noise, seed=self.settings.seed, model=model
-            )
-            table.to_parquet(folder / f"{name}.parquet")
+        about = {"family": self.settings.noise, "seed": self.settings.seed, "model": model}
+        tables = {"detectors": self._detected(arms), "realism": _measured(floor, compared)}
+        return {name: table.assign(**about) for name, table in tables.items()}
 
     def _generated(self, name: str, number: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Windows that train detectors and set their thresholds, and draws of noise for the
@@ -148,25 +140,13 @@ class Cell:
             real, again, self.settings.robustness.num_resplits, self.settings.seed
         ), held_out
 
-    def _detected(self, arms: list[np.ndarray]) -> list[dict]:
+    def _detected(self, arms: list[np.ndarray]) -> "pd.DataFrame":
         """False alarms and recall of every detector, trained on the first windows, with the
         threshold of the second ones.
         """
         trial = self.one.trial(self.settings.noise_models.num_anomalous)
         judged = evaluation.evaluate_arm(*arms, trial, DETECTORS, self.settings.seed)
-        rows = []
-        for name in DETECTORS:
-            alarms, recall = (
-                [row for row in judged[key] if row["detector"] == name]
-                for key in ("alarms", "recall")
-            )
-            counts = {key: sum(row[key] for row in alarms) for key in ("alarms", "windows")}
-            means = {
-                key: float(np.mean([row[key] for row in recall]))
-                for key in ("recall", "recall_at_real_rate")
-            }
-            rows.append({"detector": name, **counts, **means})
-        return rows
+        return evaluation.by_detector(judged)
 
     @functools.cached_property
     def _learnt(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.stages import Stages
 from studies.common.replicates import run_study
 from studies.common.settings import Settings
+from studies.common.tables import stage_tables
 from studies.public_benchmarks.arms import (
     CHOSEN,
     DIFFERENCE,
@@ -66,13 +67,11 @@ def run(options: argparse.Namespace, settings: Settings, out: Path) -> dict[str,
 
 
 def _rows_of_examples(seed: int, stages: Stages) -> "pd.DataFrame":
-    import pandas as pd
-
-    def make(folder: Path) -> None:
+    def compute() -> dict[str, list[dict[str, Any]]]:
         with tempfile.TemporaryDirectory() as models:
-            pd.DataFrame(example_rows(Path(models))).to_parquet(folder / "rows.parquet")
+            return {"rows": example_rows(Path(models))}
 
-    rows = pd.read_parquet(stages.run(EXAMPLES, make, (), version=2) / "rows.parquet")
+    rows = stage_tables(stages, EXAMPLES, compute, (), version=2)["rows"]
     about = {"series": rows["kind"], "data_set": EXAMPLES, "seed": seed}
     return rows.assign(**about, severity=np.nan, is_development=True)
 
@@ -98,12 +97,12 @@ def rows_of_series(
     tables: dict[str, list[pd.DataFrame]] = {}
     for kind, (table, rows_of, version) in KINDS.items():
 
-        def make(folder: Path, rows_of: Any = rows_of) -> None:
-            pd.DataFrame(rows_of(series, settings, seed)).to_parquet(folder / "rows.parquet")
+        def compute(rows_of: Any = rows_of) -> dict[str, list[dict[str, Any]]]:
+            return {"rows": rows_of(series, settings, seed)}
 
         name = f"{kind} {series.name.replace('/', '-')}"
-        rows = pd.read_parquet(stages.run(name, make, depends, version=version) / "rows.parquet")
-        tables.setdefault(table, []).append(rows.assign(**about))
+        found = stage_tables(stages, name, compute, depends, version=version)
+        tables.setdefault(table, []).append(found["rows"].assign(**about))
     return {table: pd.concat(rows) for table, rows in tables.items()}
 
 

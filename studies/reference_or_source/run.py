@@ -11,6 +11,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.stages import Stages, load_arrays
 from studies.common.replicates import run_study
 from studies.common.settings import Settings
+from studies.common.tables import stage_tables
 from studies.reference_or_source import ageing, recordings
 from studies.reference_or_source.aircraft import Aircraft
 from studies.reference_or_source.battery import Battery
@@ -71,8 +72,6 @@ def simulated_table(settings: Settings, stages: Stages, name: str, seed: int) ->
         name: Name of the system.
         seed: The seed.
     """
-    import pandas as pd
-
     kind, package = SIMULATED[name]
     chosen = settings.reference_or_source
     system = kind()
@@ -93,12 +92,11 @@ def simulated_table(settings: Settings, stages: Stages, name: str, seed: int) ->
     simulated = f"{name} {seed}"
     runs = stages.run(simulated, simulate, (name, counts, seed, version), version=_RUNS_VERSION)
 
-    def judge(folder: Path) -> None:
-        rows = rows_of(system, load_arrays(runs, "runs"), seed)
-        pd.DataFrame(rows).to_parquet(folder / "rows.parquet")
+    def judge() -> dict[str, Any]:
+        return {"rows": rows_of(system, load_arrays(runs, "runs"), seed)}
 
-    judged = stages.run(f"{simulated}, uses", judge, (), [simulated], _ROWS_VERSION)
-    return pd.read_parquet(judged / "rows.parquet").assign(system=name, seed=seed)
+    judged = stage_tables(stages, f"{simulated}, uses", judge, (), [simulated], _ROWS_VERSION)
+    return judged["rows"].assign(system=name, seed=seed)
 
 
 def cells_table(stages: Stages, name: str, folder: Path) -> "pd.DataFrame":
@@ -109,16 +107,11 @@ def cells_table(stages: Stages, name: str, folder: Path) -> "pd.DataFrame":
         name: `CELLS`, or `FAMILIES` for models of sisters.
         folder: The folder of the data set.
     """
-    import pandas as pd
-
     cells = load_cells(folder)
     rows_of_cells = ageing.ageing_rows if name == CELLS else ageing.family_rows
-
-    def judge(target: Path) -> None:
-        pd.DataFrame(rows_of_cells(cells)).to_parquet(target / "rows.parquet")
-
     data = [(cell.name, len(cell.discharges)) for cell in cells]
-    judged = stages.run(
-        name, judge, (data, importlib.metadata.version("pybamm")), (), _ROWS_VERSION
+    depends = (data, importlib.metadata.version("pybamm"))
+    judged = stage_tables(
+        stages, name, lambda: {"rows": rows_of_cells(cells)}, depends, (), _ROWS_VERSION
     )
-    return pd.read_parquet(judged / "rows.parquet").assign(system=name, seed=0)
+    return judged["rows"].assign(system=name, seed=0)

@@ -6,7 +6,6 @@ The true degraded signal of the example is known, so every method is compared wi
 
 import functools
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from enhsim_tf.enhancer.candidates import Training
 from enhsim_tf.enhancer.names import RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.paper.degraded import MODES, degrade
+from studies.common.tables import stage_tables
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
@@ -54,18 +54,15 @@ class DegradedModes:
         """The error of each method, mode and severity, in standard deviations of the nominal
         signal.
         """
-        import pandas as pd
-
         _ = self.example.enhancer_folder
         depends = (self.settings.paper.of("windows"), self.settings.modes)
-        folder = self.stages.run(
-            "degraded modes", self._make, depends, ("telemetry", "enhancer"), version=2
+        after = ("telemetry", "enhancer")
+        tables = stage_tables(
+            self.stages, "degraded modes", self._tables, depends, after, version=2
         )
-        return pd.read_parquet(folder / "degraded.parquet")
+        return tables["degraded"]
 
-    def _make(self, folder: Path) -> None:
-        import pandas as pd
-
+    def _tables(self) -> dict[str, list[dict[str, object]]]:
         methods = self._methods()
         unit = float(np.std(self._pairs(None, self.settings.modes.num_windows, "unit")[1]))
         cells = []
@@ -77,9 +74,10 @@ class DegradedModes:
                     float(np.sqrt(np.mean((estimate(coarse) - truth) ** 2, dtype=np.float64)))
                     / unit
                 )
-                cells.append({"method": method, "mode": mode, "severity": severity, "nrmse": error})
+                cell = {"method": method, "mode": mode, "severity": severity, "nrmse": error}
+                cells.append(cell | {"seed": self.settings.seed})
             told(done)
-        pd.DataFrame(cells).assign(seed=self.settings.seed).to_parquet(folder / "degraded.parquet")
+        return {"degraded": cells}
 
     def _test_pairs(self, mode: str, severity: float) -> tuple[np.ndarray, np.ndarray]:
         scenario = None if mode == "nominal" else Degraded(mode, severity)

@@ -4,7 +4,6 @@ again.
 
 import dataclasses
 import functools
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,7 @@ from studies.common.controls import CONTROLS
 from studies.common.detectors import DETECTORS
 from studies.common.example import Example
 from studies.common.settings import Settings
+from studies.common.tables import stage_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,11 +33,6 @@ ARMS = {
     "real": "real nominal telemetry",
 }
 """Training windows of detectors."""
-TABLES = {
-    "alarms": ["arm", "detector", "block", "alarms", "windows"],
-    "recall": ["arm", "detector", "kind", "severity", "recall", "recall_at_real_rate"],
-}
-"""Columns of the tables, beside `environment` and `seed`."""
 
 
 class Replicate:
@@ -57,37 +52,28 @@ class Replicate:
     @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The tables `alarms` and `recall`."""
-        import pandas as pd
-
         _ = self.example.enhancer_folder, self.example.gan_folder
         # the number of replicates does not affect a replicate
         which = dataclasses.replace(self.settings.robustness, num_seeds=0, first_seed=0)
         depends = (self.settings.paper.of("windows"), which)
-        folder = self.stages.run(
-            "arms", self._make_arms, depends, ("telemetry", "enhancer", "noise GAN"), version=2
-        )
-        return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
+        after = ("telemetry", "enhancer", "noise GAN")
+        return stage_tables(self.stages, "arms", self._judged, depends, after, version=2)
 
-    def _make_arms(self, folder: Path) -> None:
-        import pandas as pd
-
+    def _judged(self) -> dict[str, list[dict]]:
         trial = self.trial()
         seed = self.settings.seed
         training = self.arms("arms, training")
         held_out = self.arms("arms, threshold")
-        rows: dict[str, list[dict]] = {name: [] for name in TABLES}
+        rows: dict[str, list[dict]] = {"alarms": [], "recall": []}
+        about = {"environment": self.settings.noise, "seed": seed}
         told = self.stages.progress.loop("arm", len(ARMS))
         for done, arm in enumerate(ARMS, 1):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
             judged = evaluation.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed)
-            for name in TABLES:
-                rows[name] += [{"arm": arm, **row} for row in judged[name]]
+            for name, each in rows.items():
+                each += [{"arm": arm, **row, **about} for row in judged[name]]
             told(done)
-        for name, each in rows.items():
-            table = pd.DataFrame(each, columns=TABLES[name])
-            table.assign(environment=self.settings.noise, seed=seed).to_parquet(
-                folder / f"{name}.parquet"
-            )
+        return rows
 
     def trial(self, num_anomalous: int | None = None) -> evaluation.Trial:
         """The test data: held-out nominal windows, and the same windows with anomalies.
