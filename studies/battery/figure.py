@@ -10,6 +10,7 @@ from enhsim_tf.common.figure import Figure
 from enhsim_tf.common.plot_style import DOUBLE, ENHANCED, GENERATED, QUIET, REAL, new_sheet, panels
 from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, REAL_120, WITH_RESIDUALS
 from studies.common.faults import SEVERITIES
+from studies.common.figures import legend
 
 SHOWN: dict[str, tuple[str, dict[str, Any]]] = {
     ENHANCED_RUN: (
@@ -58,17 +59,7 @@ def reference_or_source(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.set_title(kind, weight="bold", fontsize=7.5)
     for axes in grid[-1]:
         axes.set_xlabel("severity")
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    above = 1 - down / figure.get_size_inches()[1]
-    figure.legend(
-        handles,
-        labels,
-        frameon=False,
-        ncols=2,
-        loc="upper center",
-        bbox_to_anchor=(0.5, above),
-        handlelength=2.6,
-    )
+    legend(figure, grid[0, 0], (0.5, down), ncols=2, loc="upper center", handlelength=2.6)
     return figure
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from enhsim_tf.common.figure import Figure
 from enhsim_tf.common.plot_style import AVERAGE, DOUBLE, QUIET, RESIDUALS, new_sheet, panels
+from studies.common.figures import leave_room, legend
 from studies.factorial.cells import AUTOREGRESSION, LEVELS, WHOLE_WINDOWS
 
 _SHOWN = {  # colour and marker differ, so that the comparisons can be told apart in greyscale
@@ -41,12 +42,9 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         "the coarse simulator and real telemetry. "
         "Right: recall at 1 % false alarms on real windows.",
     )
-    left = 1.35 / DOUBLE
-    width = (1 - left - 0.02) / 2
-    grid = panels(figure, down + 0.42, 1, 2, sharey=True)[0]
-    for number, (axes, (outcome, label)) in enumerate(zip(grid, _PANELS.items(), strict=True)):
-        place = axes.get_position()
-        axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
+    grid = panels(figure, down + 0.42, 1, 2, sharey=True)
+    leave_room(grid, 1.35, 1 - 1.35 / DOUBLE - 0.02)
+    for axes, (outcome, label) in zip(grid[0], _PANELS.items(), strict=True):
         for line, (generator, (colour, marker)) in enumerate(_SHOWN.items()):
             at = -np.arange(len(LEVELS)) - _APART * (line - (len(_SHOWN) - 1) / 2)
             shares = [
@@ -61,22 +59,16 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.set_yticks(-np.arange(len(LEVELS)), [_FACTORS[factor] for factor in LEVELS])
         axes.set_xlabel(label)
         axes.margins(x=0.06)
-    _, height = figure.get_size_inches()
-    handles, labels = grid[0].get_legend_handles_labels()
-    titled = {
-        "title": "generator that replaces the paper's GAN",
-        "alignment": "left",
-        "fontsize": 7.5,
-        "title_fontsize": 7.5,
-        "frameon": False,
-    }
-    figure.legend(
-        handles,
-        labels,
+    legend(
+        figure,
+        grid[0, 0],
+        (1.35 / DOUBLE - 0.01, down),
         loc="upper left",
-        bbox_to_anchor=(left - 0.01, 1 - down / height),
-        ncols=len(labels),
-        **titled,
+        ncols=len(_SHOWN),
+        title="generator that replaces the paper's GAN",
+        alignment="left",
+        fontsize=7.5,
+        title_fontsize=7.5,
     )
     return figure
 

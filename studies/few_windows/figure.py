@@ -18,6 +18,7 @@ from enhsim_tf.common.plot_style import (
     new_sheet,
     panels,
 )
+from studies.common.figures import legend
 from studies.few_windows import record
 
 _CURVES = {  # label, marker, line style and colour of each curve that is drawn
@@ -66,19 +67,10 @@ def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         _finish(upper, lower, numbers, name)
     grid[0, 0].set_ylabel("false alarms (%)")
     grid[1, 0].set_ylabel("recall (%)")
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    height = figure.get_size_inches()[1]
-    figure.legend(
-        handles,
-        labels,
-        frameon=False,
-        ncols=4,
-        loc="upper left",
-        bbox_to_anchor=(0.07, 1 - (down - 0.02) / height),
-    )
+    legend(figure, grid[0, 0], (0.07, down - 0.02), ncols=4, loc="upper left")
     figure.text(
         0.53,
-        (FOOT + 0.02) / height,
+        (FOOT + 0.02) / figure.get_size_inches()[1],
         "number of real windows k (disjoint; logarithmic)",
         ha="center",
     )

@@ -15,6 +15,7 @@ from enhsim_tf.common.plot_style import (
     new_sheet,
     panels,
 )
+from studies.common.figures import leave_room
 from studies.public_benchmarks.arms import CHOSEN, DIFFERENCE, TELEMETRY
 from studies.public_benchmarks.arms import GENERATED as GENERATED_VIEWS
 from studies.public_benchmarks.peers import PEERS, RANDOM
@@ -40,13 +41,10 @@ def areas(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         "interval over series. Squares: the same views in three uses. Diamonds: views and other "
         "detectors, with settings chosen on other series. Line: these views.",
     )
-    grid = panels(figure, down + 0.25, 1, len(groups), sharey=True)[0]
-    left = 1.95 / DOUBLE
-    width = (1 - 2.1 / DOUBLE) / len(groups)
+    grid = panels(figure, down + 0.25, 1, len(groups), sharey=True)
+    leave_room(grid, 1.95, 1 - 2.1 / DOUBLE)
     names = [name for name in ROWS if name in next(iter(groups.values()))["methods"]]
-    for number, (axes, (title, group)) in enumerate(zip(grid, groups.items(), strict=True)):
-        place = axes.get_position()
-        axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
+    for axes, (title, group) in zip(grid[0], groups.items(), strict=True):
         for height, name in enumerate(names):
             colour, mark = ROWS[name]
             area = group["methods"][name]["auc_pr"]
@@ -64,8 +62,8 @@ def areas(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.set_title(f"{title} ({group['series']} series)", loc="left", fontsize=8)
         axes.set_xlabel("AUC-PR")
         axes.set_xlim(-0.03, 1.03)
-        axes.tick_params(labelleft=not number)
-    grid[0].set_yticks([-height for height in range(len(names))], names)
+        axes.tick_params(labelleft=axes is grid[0, 0])
+    grid[0, 0].set_yticks([-height for height in range(len(names))], names)
     return figure
 
 

@@ -16,6 +16,7 @@ from enhsim_tf.common.plot_style import (
     new_sheet,
     panels,
 )
+from studies.common.figures import legend
 from studies.reference_or_source.summary import COARSE, FITTED_AND_ENHANCED
 from studies.reference_or_source.uses import COMMANDS, NO_SIMULATOR
 
@@ -50,7 +51,7 @@ def found(findings: Mapping[str, Any]) -> matplotlib.figure.Figure:
         "5 % for the cells); means over kinds of faults and seeds, or over cells.",
     )
     grid = panels(figure, down + 0.4, 1, len(systems), gap=(0.2, 0.2), sharey=True)
-    for axes, name in zip(np.ravel(grid), systems, strict=True):
+    for axes, name in zip(grid[0], systems, strict=True):
         title, label, unit = _AXES[name]
         for use, (words, style) in SHOWN.items():
             course = findings["uses"][name][use]["course"]
@@ -65,15 +66,13 @@ def found(findings: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.set_xlabel(label)
         axes.set_ylim(-4, 104)
         axes.margins(x=0.06)
-    np.ravel(grid)[0].set_ylabel("windows found (%)")
-    handles, labels = np.ravel(grid)[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        frameon=False,
+    grid[0, 0].set_ylabel("windows found (%)")
+    legend(
+        figure,
+        grid[0, 0],
+        (0.5, down),
         ncols=4,
         loc="upper center",
-        bbox_to_anchor=(0.5, 1 - down / figure.get_size_inches()[1]),
         handlelength=2.4,
         columnspacing=1.2,
         fontsize=7,

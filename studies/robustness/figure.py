@@ -22,6 +22,7 @@ from enhsim_tf.common.plot_style import (
     new_sheet,
     panels,
 )
+from studies.common.figures import leave_room
 from studies.robustness.degraded_modes import LARGEST_TRAINED
 
 Findings = Mapping[str, Any]
@@ -58,11 +59,8 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
         sharey=True,
         sharex=True,
     )
-    left = 1.95 / DOUBLE
-    width = (1 - left - 0.04) / columns
-    for number, (axes, name) in enumerate(zip(grid.ravel(), environments, strict=False)):
-        place = axes.get_position()
-        axes.set_position([left + (number % columns) * width, place.y0, width - 0.03, place.height])
+    leave_room(grid, 1.95, 1 - 1.95 / DOUBLE - 0.04)
+    for axes, name in zip(grid.ravel(), environments, strict=False):
         for height, (arm, (colour, marker)) in enumerate(_ROWS.items()):
             _row(axes, -height, found["arms"][arm]["by_environment"][name], colour, marker)
         axes.axvline(0.01, color=QUIET, linewidth=0.6, zorder=0)
