@@ -27,6 +27,8 @@ class Command:
             option `--seeds` changes.
         description: What the study does, in a sentence.
         options: Further options: for each name what `argparse` takes beside it.
+        environments: The kinds of noise of the study, of which `--environment` chooses one; the
+            options that `run` takes hold those that are asked for as `environments`.
         run: Runs the study; it takes the options, the settings and the output folder. None: `run`
             of `studies.STUDY.run`.
     """
@@ -34,6 +36,7 @@ class Command:
     study: str
     description: str
     options: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
+    environments: Iterable[str] = ()
     run: Callable[[argparse.Namespace, Any, Path], Any] | None = None
 
     def __call__(self, arguments: list[str] | None = None) -> int:
@@ -64,9 +67,18 @@ class Command:
         parser.add_argument(
             "--fresh", action="store_true", help="run every stage again instead of using the cache"
         )
+        if self.environments:
+            parser.add_argument(
+                "--environment",
+                choices=tuple(self.environments),
+                help="run with this kind of noise only (default: all)",
+            )
         for name, words in self.options.items():
             parser.add_argument(name, **words)
         options = parser.parse_args(arguments)
+        if self.environments:
+            chosen = options.environment
+            options.environments = tuple(self.environments) if chosen is None else (chosen,)
         if options.seeds is not None and options.seeds < 1:
             raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
         if options.budget == "smoke" and options.out.resolve() == own:
@@ -105,21 +117,6 @@ def add_budget_and_cache(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder of cached stages (default: .cache in a checkout)",
     )
-
-
-def environment_option(names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """The option `--environment` of a study with these kinds of noise."""
-    return {
-        "--environment": {
-            "choices": tuple(names),
-            "help": "run with this kind of noise only (default: all)",
-        }
-    }
-
-
-def environments(options: argparse.Namespace, names: Iterable[str]) -> tuple[str, ...]:
-    """The kinds of noise that `--environment` asks for."""
-    return tuple(names) if options.environment is None else (options.environment,)
 
 
 def example_command(

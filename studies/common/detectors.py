@@ -127,11 +127,7 @@ class LargestStep(_Control):
         """Returns the largest absolute first difference of each window, in the unit of the
         telemetry.
         """
-        return (
-            np.abs(np.diff(windows, axis=1))
-            .reshape(len(windows), windows.shape[1] - 1, -1)
-            .max(axis=(1, 2))
-        )
+        return np.abs(np.diff(windows, axis=1)).reshape(len(windows), -1).max(axis=1)
 
 
 class MovingDeviation(_Control):
@@ -294,14 +290,11 @@ class ConvolutionalAutoencoder(_Autoencoder):
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.backend import keras
-        from studies.common.training import seeded_initialiser
 
         # number of zeros that are appended to a window and removed from the output
         missing = -samples % 16
         layers = keras.layers
-        kernels = [
-            seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)
-        ]
+        kernels = [keras.initializers.HeUniform(self.seed * 1000 + number) for number in range(4)]
         options = {"kernel_size": 9, "strides": 4, "padding": "same"}
         return keras.Sequential(
             [

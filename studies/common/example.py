@@ -30,7 +30,8 @@ def draw_noise(kind: str, signal: np.ndarray, sd: float, rng: np.random.Generato
         float64 array of shape `(samples,)`.
     """
     process = GALLERY[kind]
-    return sd / process.standard_deviation * process.draw(len(signal), rng, signal)
+    given = (signal,) if process.follows_signal else ()
+    return sd / process.standard_deviation * process.draw(len(signal), rng, *given)
 
 
 def coarse_simulator(settings: of_paper.Settings) -> SquareWaveSimulator:

@@ -2,8 +2,8 @@
 of them a designer may look at.
 
 A function of a family draws float64 noise of mean zero and shape `(number,)`. It takes the number
-of samples, a random generator, the signal that the noise is added to (which only one family needs),
-and parameters. Standard deviations (`sd`) and amplitudes are in the unit of the signal, times in
+of samples, a random generator, and parameters; one family also takes the signal that the noise is
+added to. Standard deviations (`sd`) and amplitudes are in the unit of the signal, times in
 samples. With the values here, all families have a standard deviation of 0.1.
 
 The four environments of the study of robustness were known when the convolutional GAN was designed.
@@ -24,7 +24,6 @@ NOISES = ("white", "autoregressive", "heteroscedastic", "shot")  # of most studi
 LOOKED_AT = (*NOISES, "fractional", "heavy_tails", "one_over_f")
 _HALF = float(np.sqrt(0.005))  # half the variance of noise of standard deviation 0.1
 _SIGNAL_SD = float(np.sqrt(0.5**2 / 2 + 0.25**2 / 2))  # of the two waves of the example telemetry
-Signal = np.ndarray | None
 
 
 def first_order(number: int, coefficient: float, rng: np.random.Generator) -> np.ndarray:
@@ -37,17 +36,14 @@ def first_order(number: int, coefficient: float, rng: np.random.Generator) -> np
     return lfilter([1.0], [1.0, -coefficient], draws)
 
 
-def white(
-    number: int, rng: np.random.Generator, signal: Signal = None, sd: float = 0.1
-) -> np.ndarray:
+def white(number: int, rng: np.random.Generator) -> np.ndarray:
     """Independent Gaussian noise."""
-    return rng.normal(0.0, sd, number)
+    return rng.normal(0.0, 0.1, number)
 
 
 def autoregressive(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
     coefficient: float = 0.7,
     sd: float = 0.1,
 ) -> np.ndarray:
@@ -60,7 +56,6 @@ def autoregressive(
 def heteroscedastic(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
     log_scale_sd: float = 0.8,
     sd: float = 0.1,
     correlation: float = 2_000.0,
@@ -76,7 +71,6 @@ def heteroscedastic(
 def shot(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
     rate: float = 0.01,
     amplitude: float = 0.5,
     background_sd: float = _HALF,
@@ -92,7 +86,6 @@ def shot(
 def fractional(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
     hurst: float = 0.8,
     sd: float = 0.1,
 ) -> np.ndarray:
@@ -121,12 +114,11 @@ def fractional(
 def bernoulli(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
-    probability: float = 0.01,
-    impulse_sd: float = 10 * _HALF,
-    background_sd: float = _HALF,
 ) -> np.ndarray:
     """White noise to which samples of a share `probability` add a second, larger Gaussian draw."""
+    probability = 0.01
+    impulse_sd = 10 * _HALF
+    background_sd = _HALF
     has_impulse = rng.random(number) < probability
     return rng.normal(0.0, np.sqrt(background_sd**2 + has_impulse * impulse_sd**2))
 
@@ -134,7 +126,6 @@ def bernoulli(
 def one_over_f(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
     longest: float = 4_000.0,
     sd: float = 0.1,
 ) -> np.ndarray:
@@ -156,42 +147,38 @@ def one_over_f(
     return sd / (2 * np.sqrt(np.sum(amplitude**2)) / length) * irfft(spectrum, length)[:number]
 
 
-def interference(number: int, rng: np.random.Generator, signal: Signal = None) -> np.ndarray:
+def interference(number: int, rng: np.random.Generator) -> np.ndarray:
     """A sine whose phase wanders, on white noise: for example the mains, or a reaction wheel."""
     phase = rng.uniform(0, 2 * np.pi) + np.cumsum(rng.normal(2 * np.pi / 17.3, 0.02, number))
     return 0.1 * np.sin(phase) + rng.normal(0, _HALF, number)
 
 
-def telegraph(
-    number: int, rng: np.random.Generator, signal: Signal = None, dwell: float = 300.0
-) -> np.ndarray:
+def telegraph(number: int, rng: np.random.Generator) -> np.ndarray:
     """A level that jumps between two values after random, exponentially distributed times of mean
-    `dwell`, on white noise.
+    300, on white noise.
     """
-    changes = rng.random(number) < 1 / dwell
+    changes = rng.random(number) < 1 / 300
     level = (rng.integers(2) + np.cumsum(changes)) % 2
     return 2 * _HALF * (level - 0.5) + rng.normal(0, _HALF, number)
 
 
-def quantised(
-    number: int, rng: np.random.Generator, signal: Signal = None, step: float = 0.05
-) -> np.ndarray:
+def quantised(number: int, rng: np.random.Generator) -> np.ndarray:
     """Gaussian AR(1) noise, rounded to multiples of a step, as an analogue-to-digital converter
     does.
     """
+    step = 0.05
     return step * np.rint(0.1 * first_order(number, 0.8, rng) / step)
 
 
 def bursts(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
-    gap: float = 360.0,
-    burst: float = 40.0,
 ) -> np.ndarray:
     """White noise that is louder during bursts, which begin and end at random (a Markov chain of
     two states with mean times).
     """
+    gap = 360.0
+    burst = 40.0
     ends = 1 / np.array([gap, burst])
     num_pairs = 10 + int(2 * number / (burst + gap))
     lengths = rng.geometric(np.tile(ends, num_pairs))
@@ -207,13 +194,12 @@ def bursts(
 def heavy_tails(
     number: int,
     rng: np.random.Generator,
-    signal: Signal = None,
-    degrees: float = 3.0,
-    sd: float = 0.1,
 ) -> np.ndarray:
     """AR(1) noise whose innovations have Student's t distribution: large values are not rare, and
     they ring.
     """
+    degrees = 3.0
+    sd = 0.1
     from scipy.signal import lfilter
 
     coefficient = 0.5
@@ -223,7 +209,7 @@ def heavy_tails(
     return lfilter([1.0], [1.0, -coefficient], innovations)[settling:]
 
 
-def loudness(number: int, rng: np.random.Generator, signal: Signal = None) -> np.ndarray:
+def loudness(number: int, rng: np.random.Generator) -> np.ndarray:
     """White noise and a coloured component (AR(1)) whose loudness varies slowly."""
     log_scale_sd = 0.6
     log_scale = log_scale_sd * first_order(number, np.exp(-1 / 1_000.0), rng)
@@ -232,9 +218,9 @@ def loudness(number: int, rng: np.random.Generator, signal: Signal = None) -> np
     )
 
 
-def signal_dependent(number: int, rng: np.random.Generator, signal: Signal = None) -> np.ndarray:
+def signal_dependent(number: int, rng: np.random.Generator, signal: np.ndarray) -> np.ndarray:
     """White noise whose scale follows the signal, for example of a sensor with an error of gain."""
-    if signal is None or np.shape(signal) != (number,):
+    if np.shape(signal) != (number,):
         raise ValueError(
             f"Expected a signal of {number} samples. Received: one of shape {np.shape(signal)}."
         )
@@ -243,10 +229,13 @@ def signal_dependent(number: int, rng: np.random.Generator, signal: Signal = Non
 
 
 class NoiseProcess(NamedTuple):
-    """A family of noise: the function that draws it, and its overall standard deviation."""
+    """A family of noise: the function that draws it, its overall standard deviation, and whether
+    the function needs the signal.
+    """
 
     draw: Callable[..., np.ndarray]
     standard_deviation: float = 0.1
+    follows_signal: bool = False
 
 
 GALLERY = {
@@ -265,6 +254,6 @@ GALLERY = {
     "bursts": NoiseProcess(bursts),
     "heavy_tails": NoiseProcess(heavy_tails),
     "loudness": NoiseProcess(loudness),
-    "signal_dependent": NoiseProcess(signal_dependent),
+    "signal_dependent": NoiseProcess(signal_dependent, follows_signal=True),
 }
 """All families by name."""

@@ -58,14 +58,8 @@ def mean_interval(
     drawn = []
     for axis, size in enumerate(sizes, 1):
         labels = rng.integers(0, size, (num_resamples, size))
-        drawn.append(
-            labels.reshape(
-                [
-                    size if each == axis else num_resamples if not each else 1
-                    for each in range(len(shape))
-                ]
-            )
-        )
+        others = [each for each in range(1, len(shape)) if each != axis]
+        drawn.append(np.expand_dims(labels, others))
     found = (
         cells[(*drawn, rng.integers(0, counts[0], shape))].reshape(num_resamples, -1).mean(axis=1)
     )

@@ -5,12 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.backend import keras, tf
-from enhsim_tf.common.fast_keras import BlockwiseTraining, fused_adam, is_wide_dense_stack
-
-
-def seeded_initialiser(name: str, seed: int) -> keras.initializers.Initializer:
-    """Creates the Keras initialiser of a name, for example `he_uniform`, with a seed."""
-    return type(keras.initializers.get(name))(seed=seed)
+from enhsim_tf.common.fast_keras import fused_adam
 
 
 def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> keras.Sequential:
@@ -30,7 +25,7 @@ def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> kera
             keras.layers.Dense(
                 width,
                 activation=None if last else "relu",
-                kernel_initializer=seeded_initialiser("he_uniform", seed * 1000 + number),
+                kernel_initializer=keras.initializers.HeUniform(seed * 1000 + number),
                 name="Output" if last else f"Hidden_{number}" if number else "Input",
             )
         )
@@ -44,9 +39,8 @@ def fit_windows(
     epochs: int,
     batch_size: int,
     seed: int,
-    learning_rate: float | keras.optimizers.schedules.LearningRateSchedule = 0.001,
-    callbacks: Sequence[keras.callbacks.Callback] = (),
-) -> np.ndarray:
+    learning_rate: float,
+) -> None:
     """Trains a model that maps windows to windows, by Adam. The windows are shuffled in each epoch.
 
     Args:
@@ -56,35 +50,24 @@ def fit_windows(
         epochs: Number of epochs.
         batch_size: Number of windows in each training step.
         seed: Seed for the shuffling.
-        learning_rate: Adam's learning rate, or a schedule of it.
-        callbacks: Keras callbacks.
-
-    Returns:
-        The loss of each epoch, shape `(epochs,)`.
+        learning_rate: Adam's learning rate.
     """
-    trained = BlockwiseTraining(model) if is_wide_dense_stack(model) else model
     steps = -(-len(inputs) // batch_size)
-    # steps between which nobody looks are one call of the graph
-    at_once = 1 if callbacks else steps
-    trained.compile(
+    model.compile(
         fused_adam(learning_rate),
         loss="mean_squared_error",
         jit_compile=False,
-        steps_per_execution=at_once,
+        steps_per_execution=steps,  # an epoch is one call of the graph
     )
     rng = np.random.default_rng(seed)
     orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
-    history = trained.fit(
+    model.fit(
         _batches(inputs, targets, orders, batch_size),
         epochs=epochs,
         steps_per_epoch=steps,
-        callbacks=list(callbacks),
         verbose=0,
         shuffle=False,  # `_batches` has already shuffled the windows
     )
-    if trained is not model:
-        trained.write_back()
-    return np.array(history.history["loss"])
 
 
 def _batches(

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from studies.common.command import Command, environment_option, environments
+from studies.common.command import Command
 from studies.common.noise_processes import NOISES
 
 
@@ -18,13 +18,13 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
     def tables_of(environment: str, seed: int, stages: Any) -> dict[str, Any]:
         return Pipelines(Replicate(settings.of(environment, seed), stages)).tables()
 
-    return run_study("factorial", tables_of, environments(options, NOISES), options, settings, out)
+    return run_study("factorial", tables_of, options.environments, options, settings, out)
 
 
 description = (
     "Combines windows, extraction, enhancer and generator of two pipelines and counts false alarms."
 )
-command = Command("factorial", description, environment_option(NOISES), run)
+command = Command("factorial", description, environments=NOISES, run=run)
 
 if __name__ == "__main__":
     sys.exit(command())

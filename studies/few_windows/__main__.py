@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from studies.common.command import Command, environment_option, environments
+from studies.common.command import Command
 from studies.common.noise_processes import NOISES
 
 
@@ -27,13 +27,11 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
             )
         }
 
-    return run_study(
-        "few_windows", tables_of, environments(options, NOISES), options, settings, out
-    )
+    return run_study("few_windows", tables_of, options.environments, options, settings, out)
 
 
 description = "Varies the number of real windows from which detectors and simulators learn."
-command = Command("few_windows", description, environment_option(NOISES), run)
+command = Command("few_windows", description, environments=NOISES, run=run)
 
 if __name__ == "__main__":
     sys.exit(command())

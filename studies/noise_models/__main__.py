@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from studies.common.command import Command, environment_option, environments
+from studies.common.command import Command
 from studies.common.noise_processes import GALLERY
 
 
@@ -17,13 +17,11 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
     def tables_of(family: str, seed: int, stages: Any) -> dict[str, Any]:
         return Cell(settings.of(family, seed), stages).tables()
 
-    return run_study(
-        "noise_models", tables_of, environments(options, GALLERY), options, settings, out
-    )
+    return run_study("noise_models", tables_of, options.environments, options, settings, out)
 
 
 description = "Tries noise models on fourteen families of noise."
-command = Command("noise_models", description, environment_option(GALLERY), run)
+command = Command("noise_models", description, environments=GALLERY, run=run)
 
 if __name__ == "__main__":
     sys.exit(command())

@@ -1,5 +1,6 @@
 """Real cells as a system of the study: ageing is the fault, and sisters set the thresholds."""
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -74,16 +75,8 @@ def ageing_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
             for cell in sisters:
                 others = [each.known for name, each in by_cell.items() if name != cell.name]
                 own = by_cell[cell.name]
-                limits = {
-                    "found": conformal_threshold(np.concatenate(others), RATE),
-                    "found_alike": float(np.quantile(own.known, 1 - RATE)),
-                }
-                about |= {"group": group, "cell": cell.name}
-                yield about | _shares(KNOWN, 0.0, own.known, limits)
-                labels = _labels(_tested(cell))
-                for number, discharge in enumerate(_tested(cell)):
-                    tested = own.tested[labels == number]
-                    yield about | _shares(discharge.use, cell.loss(discharge), tested, limits)
+                for row in _rows_of(cell, own.known, own.tested, others):
+                    yield about | row
 
 
 def family_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
@@ -123,21 +116,13 @@ def family_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
                 later = _later(parts[cell.name])
                 tested = join([later, parts[cell.name].tested])
                 own = _few(parts, cell.name, others if with_sisters else [], number, tested)
-                labels = _labels(_tested(cell))
                 for use, scores in own.items():
-                    known = scores[: len(later.starts)]
-                    scores = scores[len(later.starts) :]
-                    pooled = np.concatenate([each[use] for each in of_sisters])
-                    limits = {
-                        "found": conformal_threshold(pooled, RATE),
-                        "found_alike": float(np.quantile(known, 1 - RATE)),
-                    }
-                    about = {"level": level, "group": group, "cell": cell.name, "use": use}
-                    about |= {"simulator": name if use == REFERENCE else NONE, "detector": MAIN}
-                    yield about | _shares(KNOWN, 0.0, known, limits)
-                    for place, discharge in enumerate(_tested(cell)):
-                        here = scores[labels == place]
-                        yield about | _shares(discharge.use, cell.loss(discharge), here, limits)
+                    known, judged = np.split(scores, [len(later.starts)])
+                    pooled = [each[use] for each in of_sisters]
+                    about = {"level": level, "use": use, "detector": MAIN}
+                    about |= {"simulator": name if use == REFERENCE else NONE}
+                    for row in _rows_of(cell, known, judged, pooled):
+                        yield about | row
 
 
 def windows_of(cell: AgeingCell, simulator: Any, values: Sequence[float], curve: Any) -> Judged:
@@ -155,8 +140,7 @@ def windows_of(cell: AgeingCell, simulator: Any, values: Sequence[float], curve:
     tested = windows(_tested(cell))
     scale = known.telemetry.std(axis=(0, 1))
     known, tested = (
-        Windows(part.telemetry / scale, part.coarse, part.inputs, part.starts, part.units)
-        for part in (known, tested)
+        dataclasses.replace(part, telemetry=part.telemetry / scale) for part in (known, tested)
     )
     faults = tuple((discharge.use, cell.loss(discharge)) for discharge in _tested(cell))
     return Judged(known, tested, _labels(_tested(cell)), faults, known.coarse, scale)
@@ -195,18 +179,16 @@ def _few(
     for place, sister in enumerate(sisters, 1):
         windows = parts[sister].known
         learnt.append(
-            Windows(
-                windows.telemetry * parts[sister].scale / own.scale,  # in units of the new cell
-                windows.coarse,
-                windows.inputs,
-                windows.starts + place * NUM_KNOWN * _APART,
-                windows.units + place * NUM_KNOWN,
+            dataclasses.replace(
+                windows,
+                telemetry=windows.telemetry * parts[sister].scale / own.scale,  # of the new cell
+                starts=windows.starts + place * NUM_KNOWN * _APART,
+                units=windows.units + place * NUM_KNOWN,
             )
         )
     known = join(learnt)
     if len(np.unique(known.units)) < 3:  # the windows of one discharge are in all folds
-        places = np.arange(len(known.starts))
-        known = Windows(known.telemetry, known.coarse, known.inputs, known.starts, places)
+        known = dataclasses.replace(known, units=np.arange(len(known.starts)))
     labels = np.zeros(len(tested.starts), int)
     comparison = Comparison(Judged(known, tested, labels, (), known.coarse, own.scale), 0)
     uses = (REFERENCE, NO_SIMULATOR)
@@ -235,8 +217,21 @@ def _labels(discharges: Sequence[Discharge]) -> np.ndarray:
     return np.repeat(np.arange(len(discharges)), [len(_starts(each)) for each in discharges])
 
 
-def _shares(
-    kind: str, severity: float, scores: np.ndarray, limits: dict[str, float]
-) -> dict[str, Any]:
-    shares = {name: float(np.mean(scores > limit)) for name, limit in limits.items()}
-    return {"kind": kind, "severity": severity, **shares}
+def _rows_of(
+    cell: AgeingCell, known: np.ndarray, tested: np.ndarray, others: Sequence[np.ndarray]
+) -> Iterator[dict[str, Any]]:
+    """The rows of one cell, from the scores of its known and tested windows, and from those of its
+    sisters, which set the threshold.
+    """
+    limits = {
+        "found": conformal_threshold(np.concatenate(others), RATE),
+        "found_alike": float(np.quantile(known, 1 - RATE)),
+    }
+    labels = _labels(_tested(cell))
+    parts = [(KNOWN, 0.0, known)]
+    for number, discharge in enumerate(_tested(cell)):
+        parts.append((discharge.use, cell.loss(discharge), tested[labels == number]))
+    for kind, severity, scores in parts:
+        shares = {name: float(np.mean(scores > limit)) for name, limit in limits.items()}
+        about = {"group": cell.group, "cell": cell.name}
+        yield about | {"kind": kind, "severity": severity} | shares

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from studies.common.command import Command, environment_option, environments
+from studies.common.command import Command
 from studies.common.noise_processes import NOISES
 
 
@@ -19,19 +19,17 @@ def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]
     from studies.robustness.degraded_modes import DegradedModes
     from studies.robustness.replicate import Replicate
 
-    names = environments(options, NOISES)
-
     def tables_of(environment: str, seed: int, stages: Any) -> dict[str, Any]:
         one = Replicate(settings.of(environment, seed), stages)
         return one.tables | (
-            {"degraded": DegradedModes(one).table} if environment == names[0] else {}
+            {"degraded": DegradedModes(one).table} if environment == options.environments[0] else {}
         )
 
-    return run_study("robustness", tables_of, names, options, settings, out)
+    return run_study("robustness", tables_of, options.environments, options, settings, out)
 
 
 description = "Trains detectors with each kind of noise and counts false alarms and finds."
-command = Command("robustness", description, environment_option(NOISES), run)
+command = Command("robustness", description, environments=NOISES, run=run)
 
 if __name__ == "__main__":
     sys.exit(command())

@@ -53,7 +53,7 @@ def test_every_table_has_every_row_and_a_second_run_trains_nothing(
         )
     run = importlib.import_module(f"studies.{study}.__main__").run
     kept = importlib.import_module(f"studies.{study}.summary").KEPT
-    options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
+    options = argparse.Namespace(cache=tmp_path / "cache", environments=("shot",), fresh=False)
     settings = make_settings("smoke", **SMALL)
     first = run(options, settings, tmp_path)
     assert {name: len(table) for name, table in kept.read(tmp_path).items()} == ROWS[study]

@@ -26,7 +26,6 @@ from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
-from studies.common.training import seeded_initialiser
 
 # last samples that the linear prediction, and the hidden layers, see one by one
 _NUM_LAGS = 64
@@ -293,7 +292,7 @@ def _build(
         hidden = keras.layers.Dense(
             _UNITS,
             "swish",
-            kernel_initializer=seeded_initialiser("he_uniform", seed * 1000 + number),
+            kernel_initializer=keras.initializers.HeUniform(seed * 1000 + number),
         )(hidden)
     # nearly one density at first
     small = keras.initializers.VarianceScaling(0.01, seed=seed * 1000 + 3)

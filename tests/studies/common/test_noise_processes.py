@@ -41,9 +41,9 @@ def test_families_have_mean_zero_and_the_standard_deviation_that_is_asked_for_an
     assert np.std(noise) == pytest.approx(0.1, rel=WIDE.get(name, 0.02))
     assert np.mean(noise) == pytest.approx(0, abs=SLOW.get(name, 0.002))
     owner, signal = rng(7), signal[:300]
-    first = process.draw(300, owner, signal)
-    assert (process.draw(300, rng(7), signal) == first).all()
-    assert (process.draw(300, owner, signal) != first).any()
+    first = draw_noise(name, signal, 0.1, owner)
+    assert (draw_noise(name, signal, 0.1, rng(7)) == first).all()
+    assert (draw_noise(name, signal, 0.1, owner) != first).any()
 
 
 @pytest.mark.parametrize("coefficient", [-0.5, 0.7, 0.95])

@@ -67,7 +67,7 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
         return [row | {"detector": name} for name in DETECTORS]
 
     monkeypatch.setattr(Pipelines, "judged", judged)
-    options = argparse.Namespace(cache=tmp_path / "cache", environment="shot", fresh=False)
+    options = argparse.Namespace(cache=tmp_path / "cache", environments=("shot",), fresh=False)
     found = run(options, make_settings("smoke", **SMALL), tmp_path)
     table = KEPT.read(tmp_path)["cells"]
     assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 26 * len(DETECTORS)
