@@ -19,7 +19,6 @@ from enhsim_tf.scoring.metrics import recall, threshold
 from enhsim_tf.telemetry.windows import time_blocks
 from studies.common.detectors import Detector
 from studies.common.injections import DURATIONS, SEVERITIES, inject
-from studies.common.metrics import recall_at_real_rate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,6 +139,24 @@ def evaluate_arm(
                 }
             )
     return tables
+
+
+def recall_at_real_rate(
+    real_scores: np.ndarray, anomalous_scores: np.ndarray, rate: float = 0.01
+) -> float:
+    """Computes the recall at the real rate, that is at a threshold that is set on real nominal
+    windows.
+
+    This recall measures how well a detector separates nominal from anomalous windows. It does not
+    depend on the threshold from the detector's own training arm.
+
+    Args:
+        real_scores: Scores of real nominal windows, which are not those for which the false-alarm
+            rate is reported.
+        anomalous_scores: Scores of anomalous windows.
+        rate: Nominal false-alarm rate of the threshold.
+    """
+    return recall(anomalous_scores, threshold(real_scores, rate))
 
 
 def by_detector(tables: Mapping[str, list[dict]]) -> "pd.DataFrame":

@@ -60,7 +60,8 @@ class Pipelines:
         self.seed = self.settings.seed
         self.enhancer = functools.cache(self._enhancer)
         self.extracted = functools.lru_cache(maxsize=1)(self._extracted)
-        self._model: tuple[tuple[object, ...], object] | None = None
+        # the last one is kept, because both purposes and some cells share it
+        self._fitted = functools.lru_cache(maxsize=1)(self._fit)
 
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The table `cells`. The cells whose noise is learnt from the same windows are a stage, so
@@ -214,18 +215,18 @@ class Pipelines:
         return target - self.enhancer(enhancer, windows)(coarse)
 
     def generator(self, cell: Cell) -> "WindowBootstrap | GaussianNoise | PaperGAN":
-        """The fitted noise model of a cell. The last one is kept, because both purposes and some
-        cells share it.
-        """
-        key = (*cell.source, cell.generator)
-        if self._model is None or self._model[0] != key:
-            fit = {
-                WHOLE_WINDOWS: WindowBootstrap,
-                AUTOREGRESSION: self._autoregression,
-                PAPER_GAN: self._paper_gan,
-            }[cell.generator]
-            self._model = (key, fit(self.extracted(*cell.source)))
-        return self._model[1]
+        """The fitted noise model of a cell."""
+        return self._fitted(cell.source, cell.generator)
+
+    def _fit(
+        self, source: tuple[str, str, str], generator: str
+    ) -> "WindowBootstrap | GaussianNoise | PaperGAN":
+        fit = {
+            WHOLE_WINDOWS: WindowBootstrap,
+            AUTOREGRESSION: self._autoregression,
+            PAPER_GAN: self._paper_gan,
+        }[generator]
+        return fit(self.extracted(*source))
 
     def _autoregression(self, noise: np.ndarray) -> GaussianNoise:
         return GaussianNoise.fit_autoregressions(

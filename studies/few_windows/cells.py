@@ -16,10 +16,9 @@ from enhsim_tf.paper.telemetry import cut_windows, true_signal
 from enhsim_tf.scoring import metrics
 from enhsim_tf.telemetry.series import Telemetry
 from studies.common.detectors import DETECTORS
-from studies.common.evaluation import cross_fitted_scores
+from studies.common.evaluation import cross_fitted_scores, recall_at_real_rate
 from studies.common.example import coarse_simulator, draw_noise
 from studies.common.injections import DURATIONS, inject
-from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import Settings
 from studies.common.tables import stage_tables
 from studies.few_windows.record import (

@@ -6,15 +6,15 @@ the study of robustness.
 """
 
 import functools
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from studies.common import evaluation
 from studies.common.detectors import DETECTORS
-from studies.common.gaussian_noise import CANDIDATES, GaussianNoise, fit_candidate
+from studies.common.gaussian_noise import CANDIDATES, fit_candidate
 from studies.common.settings import Settings
 from studies.common.tables import stage_tables
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
@@ -101,7 +101,7 @@ class Cell:
         """Windows that train detectors and set their thresholds, and draws of noise for the
         measures of realism.
         """
-        model = self._fit(name)
+        draw = self._fit(name)
         seed = self.settings.seed
         rng = np.random.default_rng([seed, _STREAMS[name], _DRAW])
         purposes = ("ladder, training", "ladder, threshold")
@@ -109,24 +109,24 @@ class Cell:
             self.example.windows("train", self.settings.robustness.num_windows, purpose)["truth"]
             for purpose in purposes
         ]
-        arms = [
-            clean + model.generate(len(clean), rng, clean[:, :, None])[:, :, 0] for clean in waves
-        ]
+        arms = [clean + draw(clean, rng) for clean in waves]
         more = self.example.windows("calibration", number, "ladder, realism")["truth"]
         # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise
         # of real telemetry has
-        compared = [
-            more + model.generate(number, rng, more[:, :, None])[:, :, 0] - more
-            for _ in range(_NUM_DRAWS)
-        ]
+        compared = [more + draw(more, rng) - more for _ in range(_NUM_DRAWS)]
         return arms, compared
 
-    def _fit(self, name: str) -> "GaussianNoise | WindowBootstrap | _OneChannel":
-        noise, clean, starts = self._learnt
-        if name != LEARNT:
-            return fit_candidate(name, noise, clean)
-        learner = MixtureDensityNoise(self.settings.seed, self.settings.noise_models.num_steps)
-        return _OneChannel(learner.fit(noise[:, :, 0], clean[:, :, 0], starts))
+    def _fit(self, name: str) -> Callable[[np.ndarray, np.random.Generator], np.ndarray]:
+        """Fits a model, and returns a function that draws noise below windows of the signal, both
+        of shape `(windows, samples)`.
+        """
+        noise, signal, starts = self._learnt
+        if name == LEARNT:
+            learner = MixtureDensityNoise(self.settings.seed, self.settings.noise_models.num_steps)
+            learner.fit(noise, signal, starts)
+            return lambda clean, rng: learner.generate(len(clean), rng, clean)
+        model = fit_candidate(name, noise[:, :, None], signal[:, :, None])
+        return lambda clean, rng: model.generate(len(clean), rng, clean[:, :, None])[:, :, 0]
 
     def _floor(self) -> tuple[RealFloor, np.ndarray]:
         """The real-vs-real baseline of two samples of true noise, and held-out windows of a third
@@ -156,19 +156,7 @@ class Cell:
         windows = self.example.windows(
             "train", self.settings.noise_models.num_windows, "ladder, learnt"
         )
-        target, truth = (windows[name][:, :, None] for name in ("target", "truth"))
-        return target - truth, truth, windows["start"]
-
-
-class _OneChannel:
-    """The learnt noise, which knows no axis of channels, with one."""
-
-    def __init__(self, model: MixtureDensityNoise):
-        self.model = model
-
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(number, samples, 1)`, as the signal."""
-        return self.model.generate(number, rng, signal[:, :, 0])[:, :, None]
+        return windows["target"] - windows["truth"], windows["truth"], windows["start"]
 
 
 def _measured(floor: RealFloor, compared: list[np.ndarray]) -> "pd.DataFrame":

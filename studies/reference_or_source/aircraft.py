@@ -35,11 +35,9 @@ class Aircraft:
     `onset` of every flight to its end.
     """
 
-    name = "aircraft"
     is_continuous = False
     channels = ("airspeed", "climb rate", "pitch", "N1 left", "N1 right", "altitude")
     coarse_columns = (*channels, *COMMANDS)
-    interval_s = 1.0
     unit_samples = UNIT_SAMPLES
     onset = ONSET
     window = 120

@@ -15,7 +15,6 @@ from studies.battery.faults import (
     measure,
 )
 from studies.battery.orbits import (
-    INTERVAL_S,
     ORBIT_SAMPLES,
     REGIMES,
     battery_current,
@@ -38,11 +37,8 @@ class Battery:
     battery reaches its usual temperature, is left out.
     """
 
-    name = "battery"
     is_continuous = True
     """Whether a run goes on from unit to unit."""
-    channels = ("voltage", "current", "temperature")
-    interval_s = INTERVAL_S
     unit_samples = ORBIT_SAMPLES
     window = 100
     onset = 0

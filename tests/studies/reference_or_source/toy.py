@@ -14,7 +14,7 @@ class Offset:
 
 
 class Toy:
-    name, channels, interval_s, is_continuous = "toy", ("first", "second"), 1.0, False
+    is_continuous = False
     unit_samples, window, onset = 200, 20, 50
     faults = (Offset("offset", 0.5), Offset("offset", 1.0), Offset("silence", 1.0))
     parameters, first_values = ("gain",), np.array([1.0])
