@@ -2,98 +2,30 @@
 residual windows (section 2.3).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.noise.registry import MATCHED, NONE, RESIDUAL_WINDOWS, NoiseModel, noise_model
+from enhsim_tf.noise.registry import MATCHED, NONE, RESIDUAL_WINDOWS, noise_model
 
 CANDIDATES = (NONE, "gaussian", "autoregression", RESIDUAL_WINDOWS, MATCHED)
 """The noise models that need no training, the simplest first."""
-_MOST_ORDER = 200  # of the autoregression
+_MOST_ORDERS = {"gaussian": 0, "autoregression": 200}
+Draw = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+"""Draws noise below windows of the signal, both of shape `(windows, samples)`."""
 
 
-def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> "GaussianNoise | NoiseModel":
+def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray) -> Draw:
     """Fits one of `CANDIDATES` to windows of noise and the enhanced signal below them, both of
-    shape `(windows, samples, channels)`.
+    shape `(windows, samples)`.
     """
-    if name == "gaussian":
-        return GaussianNoise.fit(noise)
-    if name == "autoregression":
-        return GaussianNoise.fit_autoregressions(noise, min(_MOST_ORDER, noise.shape[1] - 1))
-    return noise_model(name).fit(noise, signal)
-
-
-class GaussianNoise:
-    """Stationary Gaussian noise: white draws that are mixed between channels, and an autoregression
-    of each channel, if there are any.
-
-    Args:
-        root: Matrix by which independent draws are mixed, shape `(channels, channels)`: their
-            covariance is `root @ root.T`.
-        window: Number of samples in a window.
-        processes: The autoregression of each channel, of which the mixed draws are the innovations.
-            Empty: the noise is white.
-    """
-
-    def __init__(
-        self, root: np.ndarray, window: int, processes: "Sequence[GaussianAutoregression]" = ()
-    ):
-        self.root = np.asarray(root, np.float64)
-        self.window = int(window)
-        self.processes = tuple(processes)
-
-    @classmethod
-    def fit(cls, windows: np.ndarray) -> "GaussianNoise":
-        """Fits white noise to windows of noise of shape `(windows, samples, channels)`."""
-        return cls(
-            _root(np.cov(windows.reshape(-1, windows.shape[2]), rowvar=False, bias=True)),
-            windows.shape[1],
-        )
-
-    @classmethod
-    def fit_autoregressions(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianNoise":
-        """Fits an autoregression to each channel, see `GaussianAutoregression.fit`, and the
-        correlation of their innovations.
-        """
-        from scipy.signal import lfilter
-
-        found = [
-            GaussianAutoregression.fit(windows[:, :, channel], max_order)
-            for channel in range(windows.shape[2])
-        ]
-        most = max(len(each.coefficients) for each in found)
-        left = [
-            lfilter([1.0, *-each.coefficients], [1.0], windows[:, :, k], axis=1)[:, most:].ravel()
-            for k, each in enumerate(found)
-        ]
-        return cls(_root(np.corrcoef(left)), windows.shape[1], found)
-
-    def generate(
-        self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no
-        effect.
-        """
-        draws = rng.standard_normal((number, self.window, len(self.root))) @ self.root.T
-        if self.processes:
-            draws = np.stack(
-                [
-                    each.filtered(draws[:, :, channel])
-                    for channel, each in enumerate(self.processes)
-                ],
-                axis=2,
-            )
-        return draws.astype(np.float32)
-
-
-def _root(covariance: np.ndarray) -> np.ndarray:
-    """Returns the symmetric root of a covariance, which may be singular, or of the variance of a
-    single channel.
-    """
-    values, vectors = np.linalg.eigh(np.atleast_2d(covariance))
-    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    if name in _MOST_ORDERS:
+        most = min(_MOST_ORDERS[name], noise.shape[1] - 1)
+        process = GaussianAutoregression.fit(noise, most)
+        return lambda clean, rng: process.generate(len(clean), rng)
+    model = noise_model(name).fit(noise[:, :, None], signal[:, :, None])
+    return lambda clean, rng: model.generate(len(clean), rng, clean[:, :, None])[:, :, 0]
 
 
 class GaussianAutoregression:
@@ -104,20 +36,16 @@ class GaussianAutoregression:
         coefficients: Autoregressive coefficients, from lag 1 upwards. An empty sequence gives white
             noise.
         innovation_sd: Standard deviation of the innovations, in the unit of the telemetry.
+        window: Number of samples in a window.
 
     Raises:
-        InputError: If the coefficients do not belong to a stationary process, or the standard
-            deviation is negative.
+        InputError: If the coefficients do not belong to a stationary process.
     """
 
-    def __init__(self, coefficients: Sequence[float], innovation_sd: float):
+    def __init__(self, coefficients: Sequence[float], innovation_sd: float, window: int):
         self.coefficients = np.asarray(coefficients, np.float64)
         self.innovation_sd = float(innovation_sd)
-        if not self.innovation_sd >= 0:
-            raise InputError(
-                "Expected innovations with a standard deviation of 0 or more. Received: "
-                f"{self.innovation_sd}."
-            )
+        self.window = window
         self._start = _lower_orders(self.coefficients, self.innovation_sd)
 
     @classmethod
@@ -148,18 +76,16 @@ class GaussianAutoregression:
             orders.append((coefficients, variance))
             criteria.append(windows.size * np.log(variance) + 2 * order)
         coefficients, variance = orders[int(np.argmin(criteria))]
-        return cls(coefficients, np.sqrt(variance))
+        return cls(coefficients, np.sqrt(variance), windows.shape[1])
 
-    def filtered(self, draws: np.ndarray) -> np.ndarray:
-        """Returns the noise whose innovations are `draws`, standard normal of shape `(windows,
-        samples)`; float32 of that shape.
-        """
+    def generate(self, number: int, rng: np.random.Generator) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples)`."""
         from scipy.signal import lfilter
 
-        shape = draws.shape
+        draws = rng.standard_normal((number, self.window))
         innovations = self.innovation_sd * draws
         whitening = np.concatenate([[1.0], -self.coefficients])
-        start = np.zeros((shape[0], min(len(self.coefficients), shape[1])))
+        start = np.zeros((number, min(len(self.coefficients), self.window)))
         # each of the first samples is predicted from all earlier ones
         for place in range(start.shape[1]):
             past, sd = self._start[place]

@@ -15,7 +15,7 @@ from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.windows import random_window_starts
 from studies.common import detectors, evaluation
-from studies.common.gaussian_noise import GaussianNoise
+from studies.common.gaussian_noise import GaussianAutoregression
 from studies.common.tables import stage_tables
 from studies.factorial.cells import (
     AUTOREGRESSION,
@@ -129,9 +129,8 @@ class Pipelines:
         if cell == "coarse":
             return coarse
         rng = np.random.default_rng(int(self.example.draw(purpose).integers(2**31)))
-        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(
-            number, rng
-        ).reshape(coarse.shape)
+        signal = self.enhancer(cell.enhancer, cell.windows)(coarse)
+        return signal + self.generator(cell).generate(number, rng)
 
     def number(self, windows: str) -> int:
         """Number of windows that a level of the factor `windows` stands for."""
@@ -214,13 +213,13 @@ class Pipelines:
         coarse, target = self.pairs(starts)
         return target - self.enhancer(enhancer, windows)(coarse)
 
-    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianNoise | PaperGAN":
+    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | PaperGAN":
         """The fitted noise model of a cell."""
         return self._fitted(cell.source, cell.generator)
 
     def _fit(
         self, source: tuple[str, str, str], generator: str
-    ) -> "WindowBootstrap | GaussianNoise | PaperGAN":
+    ) -> "WindowBootstrap | GaussianAutoregression | PaperGAN":
         fit = {
             WHOLE_WINDOWS: WindowBootstrap,
             AUTOREGRESSION: self._autoregression,
@@ -228,9 +227,9 @@ class Pipelines:
         }[generator]
         return fit(self.extracted(*source))
 
-    def _autoregression(self, noise: np.ndarray) -> GaussianNoise:
-        return GaussianNoise.fit_autoregressions(
-            noise[:, :, None], min(self.settings.factorial.max_order, self.window - 1)
+    def _autoregression(self, noise: np.ndarray) -> GaussianAutoregression:
+        return GaussianAutoregression.fit(
+            noise, min(self.settings.factorial.max_order, self.window - 1)
         )
 
     def _paper_gan(self, noise: np.ndarray) -> "PaperGAN":

@@ -89,8 +89,7 @@ class Record:
         """
         rng = np.random.default_rng([self.seed, purpose])
         clean = self.enhance(self._coarse(rng.integers(0, _START_RANGE, num_windows)))
-        model = fit_candidate(name, *(each[:, :, None] for each in self.residuals))
-        return clean + model.generate(num_windows, rng, clean[:, :, None])[:, :, 0]
+        return clean + fit_candidate(name, *self.residuals)(clean, rng)
 
 
 def coral_alignment(source: np.ndarray, target: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

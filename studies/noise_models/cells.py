@@ -6,7 +6,6 @@ the study of robustness.
 """
 
 import functools
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from enhsim_tf.common.stages import Stages
 from studies.common import evaluation
 from studies.common.detectors import DETECTORS
-from studies.common.gaussian_noise import CANDIDATES, fit_candidate
+from studies.common.gaussian_noise import CANDIDATES, Draw, fit_candidate
 from studies.common.settings import Settings
 from studies.common.tables import stage_tables
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
@@ -116,7 +115,7 @@ class Cell:
         compared = [more + draw(more, rng) - more for _ in range(_NUM_DRAWS)]
         return arms, compared
 
-    def _fit(self, name: str) -> Callable[[np.ndarray, np.random.Generator], np.ndarray]:
+    def _fit(self, name: str) -> Draw:
         """Fits a model, and returns a function that draws noise below windows of the signal, both
         of shape `(windows, samples)`.
         """
@@ -125,8 +124,7 @@ class Cell:
             learner = MixtureDensityNoise(self.settings.seed, self.settings.noise_models.num_steps)
             learner.fit(noise, signal, starts)
             return lambda clean, rng: learner.generate(len(clean), rng, clean)
-        model = fit_candidate(name, noise[:, :, None], signal[:, :, None])
-        return lambda clean, rng: model.generate(len(clean), rng, clean[:, :, None])[:, :, 0]
+        return fit_candidate(name, noise, signal)
 
     def _floor(self) -> tuple[RealFloor, np.ndarray]:
         """The real-vs-real baseline of two samples of true noise, and held-out windows of a third

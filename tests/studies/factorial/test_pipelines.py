@@ -90,5 +90,5 @@ def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_co
         (Cell("many", "residual", "network", "autoregression"), one.second_network),
     ):
         rng = np.random.default_rng(int(one.example.draw(TRAINING).integers(2**31)))
-        noise = one.generator(cell).generate(len(coarse), rng).reshape(coarse.shape)
+        noise = one.generator(cell).generate(len(coarse), rng)
         assert np.array_equal(one.arm(cell, TRAINING), enhance(coarse) + noise)
