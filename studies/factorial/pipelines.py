@@ -3,12 +3,15 @@ detectors that are trained on their sum.
 """
 
 import functools
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.common.atomic_files import write_json
+from enhsim_tf.common.stages import load_arrays, save_arrays
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
@@ -171,34 +174,28 @@ class Pipelines:
         """The network of the residual pipeline, which is trained on more windows in fewer
         epochs.
         """
-        from enhsim_tf.enhancer.model import Enhancer
+        from enhsim_tf.simulator.packing import unpacked
 
         _ = self.example.telemetry
         depends = (self.settings.paper.of("windows"), self.settings.second)
         folder = self.stages.run(
-            "second network", self._train_second, depends, ("telemetry",), version=3
+            "second network", self._train_second, depends, ("telemetry",), version=4
         )
-        with np.load(folder / "enhancer.npz") as arrays:
-            number = sum(name.startswith("kernel_") for name in arrays)
-            layers = tuple(
-                (arrays[f"kernel_{layer}"], arrays[f"bias_{layer}"]) for layer in range(number)
-            )
-            enhancer = Enhancer(
-                NETWORK, self.window, 1, 1, arrays["centre"], arrays["bias"], layers=layers
-            )
+        state = json.loads((folder / "enhancer.json").read_text())
+        enhancer = unpacked(state, load_arrays(folder))
         return lambda coarse: enhancer.predict(coarse[:, :, None])[:, :, 0]
 
     def _train_second(self, folder: Path) -> None:
         from enhsim_tf.enhancer.candidates import Training
+        from enhsim_tf.simulator.packing import packed
 
         self.stages.progress.step("enhancer network")
         starts = self.training_starts(MANY)
         training = Training(*(each[:, :, None] for each in self.pairs(starts)), starts)
         enhancer = training.fit(NETWORK, self.seed, self.settings.second.epochs)
-        arrays = {"centre": enhancer.centre, "bias": enhancer.bias}
-        for layer, (kernel, bias) in enumerate(enhancer.layers):
-            arrays |= {f"kernel_{layer}": kernel, f"bias_{layer}": bias}
-        np.savez(folder / "enhancer.npz", **arrays)
+        arrays: dict[str, np.ndarray] = {}
+        write_json(folder / "enhancer.json", packed(enhancer, arrays, "enhancer"))
+        save_arrays(folder, arrays)
 
     def _extracted(self, windows: str, extraction: str, enhancer: str) -> np.ndarray:
         """Windows of the noise that a generator learns, of shape `(windows, samples)`; the
