@@ -3,6 +3,9 @@ without a simulator.
 """
 
 import numpy as np
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from studies.reference_or_source.windows import by_fold
 
@@ -15,37 +18,27 @@ class Autoregression:
 
     Args:
         order: Number of last samples.
-        penalty: Penalty of the ridge regression, a factor of the mean square of a standardised
-            column.
+        penalty: Penalty of the ridge regression on standardised columns.
     """
 
     def __init__(self, order: int, penalty: float):
         self.order = order
-        self.penalty = penalty
+        self._machine = make_pipeline(StandardScaler(), Ridge(penalty, solver="cholesky"))
 
     def fit(self, telemetry: np.ndarray, inputs: np.ndarray) -> "Autoregression":
         """Fits nominal windows of shape `(windows, samples, channels)` and `(windows, samples,
         columns)`.
         """
-        rows, targets = self._rows(telemetry, inputs)
-        self._mean = rows.mean(axis=0)
-        self._middle = targets.mean(axis=0)
-        deviation = rows.std(axis=0)
-        self._scale = np.where(deviation > 1e-9, deviation, np.inf)
-        rows = (rows - self._mean) / self._scale
-        gram = rows.T @ rows
-        gram[np.diag_indices_from(gram)] += self.penalty + 1e-9 * len(rows)
-        self._weights = np.linalg.solve(gram, rows.T @ (targets - self._middle))
+        self._machine.fit(*self._rows(telemetry, inputs))
         return self
 
     def errors(self, telemetry: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Telemetry less its prediction; the first `order` samples of a window, which nothing
         predicts, are left out.
         """
-        values = np.asarray(telemetry, np.float64)
-        rows, targets = self._rows(values, inputs)
-        predicted = self._middle + (rows - self._mean) / self._scale @ self._weights
-        return (targets - predicted).reshape(len(values), -1, values.shape[2])
+        rows, targets = self._rows(telemetry, inputs)
+        apart = targets - self._machine.predict(rows)
+        return apart.reshape(len(telemetry), -1, telemetry.shape[2])
 
     def _rows(self, telemetry: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         values = np.asarray(telemetry, np.float64)
@@ -69,11 +62,10 @@ def choose(telemetry: np.ndarray, inputs: np.ndarray, folds: np.ndarray) -> Auto
 def held_out_errors(
     model: Autoregression, telemetry: np.ndarray, inputs: np.ndarray, folds: np.ndarray
 ) -> np.ndarray:
-    """Errors of each window by a model like this one that has not learnt from its fold."""
+    """Errors of each window by the model while it has not learnt from the window's fold."""
 
     def errors(learnt: np.ndarray, held_out: np.ndarray) -> np.ndarray:
-        fitted = Autoregression(model.order, model.penalty)
-        fitted.fit(telemetry[learnt], inputs[learnt])
-        return fitted.errors(telemetry[held_out], inputs[held_out])
+        model.fit(telemetry[learnt], inputs[learnt])
+        return model.errors(telemetry[held_out], inputs[held_out])
 
     return by_fold(folds, errors)

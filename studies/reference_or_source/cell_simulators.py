@@ -21,6 +21,7 @@ from studies.reference_or_source.real_cells import (
     AgeingCell,
     Discharge,
 )
+from studies.reference_or_source.recordings import errors_of
 
 CAPACITY_AH = 2.0
 RESISTANCE_OHM = 0.1
@@ -137,15 +138,13 @@ def fit_values(
     some = discharges[_FITTED_TO]
     number = COLUMNS.index("current")
     telemetry = np.concatenate([discharge.values[:, :number] for discharge in some])
-    scale = telemetry.std(axis=0)
 
     def errors(logarithms: np.ndarray) -> np.ndarray:
         values = np.exp(logarithms)
         runs = [
             simulator(discharge.values[:, number], ambient_c, values, curve) for discharge in some
         ]
-        apart = (np.concatenate(runs) - telemetry) / scale
-        return (apart - apart.mean(axis=0)).ravel()  # detectors do not mind an offset either
+        return errors_of(np.concatenate(runs), telemetry)
 
     low, high = np.log(BOUNDS)
     fitted = least_squares(

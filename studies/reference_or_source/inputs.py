@@ -62,10 +62,9 @@ def fit_map(
     telemetry: np.ndarray,
     starts: np.ndarray,
     name: str = "ridge",
-    seed: int = 0,
 ) -> Map:
     """Fits an enhancer of the package to windows; returns a function of coarse windows."""
-    return Training(coarse, telemetry, starts).fit(name, seed).predict
+    return Training(coarse, telemetry, starts).fit(name, 0).predict
 
 
 def regressions(num_columns: int) -> "Mapping[str, Callable[..., Map]]":

@@ -85,7 +85,6 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
         The values of `system.parameters` that lead from the commands to telemetry of shape
         `(samples, channels)`.
     """
-    scale = telemetry.std(axis=0)
     number = telemetry.shape[1]
 
     def values(moved: np.ndarray) -> np.ndarray:
@@ -94,8 +93,7 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
 
     def errors(moved: np.ndarray) -> np.ndarray:
         run = system.run_coarse(commands, values(moved))
-        apart = (run[:, :number] - telemetry) / scale
-        return (apart - apart.mean(axis=0)).ravel()  # detectors do not mind an offset either
+        return errors_of(run[:, :number], telemetry)
 
     bounds = 1 + np.asarray(system.bounds[0]), 1 + np.asarray(system.bounds[1])
     return values(
@@ -103,3 +101,11 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
             errors, np.ones(len(system.parameters)), diff_step=0.1, max_nfev=15, bounds=bounds
         ).x
     )
+
+
+def errors_of(run: np.ndarray, telemetry: np.ndarray) -> np.ndarray:
+    """The differences of a run from telemetry whose squares a fit makes least, in standard
+    deviations of each channel and without an offset, which detectors do not mind either.
+    """
+    apart = (run - telemetry) / telemetry.std(axis=0)
+    return (apart - apart.mean(axis=0)).ravel()
