@@ -8,6 +8,7 @@ that each window is transformed only once when the same windows are resampled ma
 import functools
 
 import numpy as np
+from sklearn.preprocessing import StandardScaler
 
 from enhsim_tf.common.measures import lagged_products
 
@@ -56,16 +57,12 @@ def kurtosis_difference(generated: np.ndarray, real: np.ndarray) -> float:
     """Excess kurtosis of the generated values minus that of the real values. A positive difference
     means too heavy tails.
     """
-    return _excess_kurtosis(generated) - _excess_kurtosis(real)
+    return _standardised_fourth_moment(generated) - _standardised_fourth_moment(real)
 
 
-def _excess_kurtosis(windows: np.ndarray) -> float:
-    """The standardised fourth moment of the values minus 3, which is 0 for a Gaussian
-    distribution.
-    """
-    centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
-    squares = centred**2
-    return float(np.mean(squares**2) / (np.mean(squares) ** 2 + _TINY) - 3)
+def _standardised_fourth_moment(windows: np.ndarray) -> float:
+    squares = (np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)) ** 2
+    return float(np.mean(squares**2) / (np.mean(squares) ** 2 + _TINY))
 
 
 def tail_ratio(generated: np.ndarray, real: np.ndarray) -> float:
@@ -229,16 +226,10 @@ def mmd_squared(generated_features: np.ndarray, real_features: np.ndarray) -> fl
     kernel = squareform(
         np.exp(pdist(np.concatenate([generated, real]), "sqeuclidean") / (-2 * bandwidth))
     )
-    is_generated = np.repeat([1.0, 0.0], [number, other])[:, None]
-    to_generated = kernel @ is_generated
-    both = np.sum(is_generated * to_generated)
-    cross = np.sum((1 - is_generated) * to_generated)
-    rest = kernel.sum() - both - 2 * cross
-    return float(
-        both / (number * (number - 1)) + rest / (other * (other - 1)) - 2 * cross / (number * other)
-    )
+    within = kernel[:number, :number].sum() / (number * (number - 1))
+    within_real = kernel[number:, number:].sum() / (other * (other - 1))
+    return float(within + within_real - 2 * kernel[:number, number:].mean())
 
 
 def _standardised(features: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    spread = np.std(reference, axis=0)
-    return (features - np.mean(reference, axis=0)) / np.where(spread > 0, spread, 1)
+    return StandardScaler().fit(reference).transform(features)
