@@ -111,11 +111,8 @@ def fractional(
     return sd * irfft(np.sqrt(half * power) * spectrum, 2 * half)[:number]
 
 
-def bernoulli(
-    number: int,
-    rng: np.random.Generator,
-) -> np.ndarray:
-    """White noise to which samples of a share `probability` add a second, larger Gaussian draw."""
+def bernoulli(number: int, rng: np.random.Generator) -> np.ndarray:
+    """White noise to which one sample in a hundred adds a second, larger Gaussian draw."""
     probability = 0.01
     impulse_sd = 10 * _HALF
     background_sd = _HALF
@@ -170,10 +167,7 @@ def quantised(number: int, rng: np.random.Generator) -> np.ndarray:
     return step * np.rint(0.1 * first_order(number, 0.8, rng) / step)
 
 
-def bursts(
-    number: int,
-    rng: np.random.Generator,
-) -> np.ndarray:
+def bursts(number: int, rng: np.random.Generator) -> np.ndarray:
     """White noise that is louder during bursts, which begin and end at random (a Markov chain of
     two states with mean times).
     """
@@ -191,17 +185,14 @@ def bursts(
     )
 
 
-def heavy_tails(
-    number: int,
-    rng: np.random.Generator,
-) -> np.ndarray:
+def heavy_tails(number: int, rng: np.random.Generator) -> np.ndarray:
     """AR(1) noise whose innovations have Student's t distribution: large values are not rare, and
     they ring.
     """
-    degrees = 3.0
-    sd = 0.1
     from scipy.signal import lfilter
 
+    degrees = 3.0
+    sd = 0.1
     coefficient = 0.5
     settling = 200
     scale = sd * np.sqrt((1 - coefficient**2) * (degrees - 2) / degrees)
