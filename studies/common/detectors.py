@@ -97,17 +97,17 @@ class JointMeans:
 
     def fit(self, windows: np.ndarray) -> "JointMeans":
         """Estimates mean and covariance from nominal windows."""
-        means = np.mean(windows, axis=1, dtype=np.float64)
-        self._mean = means.mean(axis=0)
-        self._precision = np.linalg.pinv(np.atleast_2d(np.cov(means, rowvar=False)), hermitian=True)
+        from sklearn.covariance import EmpiricalCovariance
+
+        self._covariance = EmpiricalCovariance().fit(np.mean(windows, axis=1, dtype=np.float64))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the squared distance of each window, divided by the number of means: about 1 for
         nominal windows.
         """
-        apart = np.mean(windows, axis=1, dtype=np.float64) - self._mean
-        return np.einsum("wi,ij,wj->w", apart, self._precision, apart) / apart.shape[1]
+        means = np.mean(windows, axis=1, dtype=np.float64)
+        return self._covariance.mahalanobis(means) / means.shape[1]
 
 
 class _Control:
