@@ -66,7 +66,8 @@ def find_series(folders: Sequence[str | os.PathLike]) -> dict[str, Callable[[], 
     for folder in map(Path, folders):
         if (folder / LABELS).is_file():
             here = {
-                name: functools.partial(_spacecraft, folder, name) for name in read_labels(folder)
+                name: functools.partial(_spacecraft, folder, name, labels)
+                for name, labels in read_labels(folder).items()
             }
         else:
             paths = sorted(path for path in folder.glob("*/*.csv") if _is_experiment(path))
@@ -88,10 +89,8 @@ def find_series(folders: Sequence[str | os.PathLike]) -> dict[str, Callable[[], 
     return found
 
 
-def _spacecraft(folder: Path, name: str) -> Series:
-    channel = load_channel(folder, name)
-    parts = channel.train.values, channel.test.values
-    return _labelled(Series(name, SPACECRAFT, *parts, channel.sequences))
+def _spacecraft(folder: Path, name: str, labels: Ranges) -> Series:
+    return _labelled(Series(name, SPACECRAFT, *load_channel(folder, name, labels)))
 
 
 def _is_experiment(path: Path) -> bool:

@@ -7,36 +7,16 @@ their last sample in the file; here they are half-open ranges.
 """
 
 import ast
-import dataclasses
 import os
 from pathlib import Path
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 
 LABELS = "labeled_anomalies.csv"
 Ranges = tuple[tuple[int, int], ...]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class LabelledChannel:
-    """One channel with its labels.
-
-    Args:
-        name: Its name.
-        train: Nominal telemetry.
-        test: Telemetry with the labelled sequences. Its samples are counted from 0 again.
-        sequences: Anomalous samples of the test part, as half-open ranges in the order of time that
-            do not overlap.
-    """
-
-    name: str
-    train: Telemetry
-    test: Telemetry
-    sequences: Ranges
 
 
 def read_labels(folder: str | os.PathLike) -> dict[str, Ranges]:
@@ -108,37 +88,35 @@ def _joined(sequences: list[tuple[int, int]]) -> Ranges:
     return tuple(joined)
 
 
-def load_channel(folder: str | os.PathLike, channel: str) -> LabelledChannel:
+def load_channel(
+    folder: str | os.PathLike, channel: str, labels: Ranges
+) -> tuple[np.ndarray, np.ndarray, Ranges]:
     """Loads one labelled channel.
 
     Args:
         folder: The folder with `train/`, `test/` and `labeled_anomalies.csv`.
-        channel: Name of the channel. Its sequences that reach beyond the test part are cut at its
-            end.
+        channel: Name of the channel.
+        labels: Its anomalous samples, as `read_labels` returns them.
+
+    Returns:
+        Nominal telemetry, and telemetry with the labelled sequences, float32 of shape `(samples,
+        1)`; and the anomalous samples of the latter, cut at its end.
 
     Raises:
-        InputError: If the channel has no labels, an array is missing or cannot be used, or a label
-            lies beyond the test part.
+        InputError: If an array is missing or cannot be used, or a label lies beyond the test part.
     """
-    labels = read_labels(folder)
-    if channel not in labels:
-        raise InputError(
-            f"Expected a labelled channel, one of: {', '.join(list(labels)[:8])}. Received: "
-            f"{channel!r}. Name one of these."
-        )
     train, test = (_read(Path(folder) / part, channel) for part in ("train", "test"))
-    for start, _ in labels[channel]:
+    for start, _ in labels:
         if start >= len(test):
             raise InputError(
                 f"Expected sequences inside the test part of {len(test):,} samples. Received: one "
                 f"from sample {start:,} of {channel} in {LABELS}. "
                 "Correct the line, or give the whole array."
             )
-    sequences = tuple((start, min(stop, len(test))) for start, stop in labels[channel])
-    return LabelledChannel(channel, train, test, sequences)
+    return train, test, tuple((start, min(stop, len(test))) for start, stop in labels)
 
 
-def _read(folder: Path, channel: str) -> Telemetry:
+def _read(folder: Path, channel: str) -> np.ndarray:
     path = folder / f"{channel}.npy"
     values = next(iter(read_source(path).values())).cells.to_numpy(np.float32)
     if not np.isfinite(values).all():
@@ -146,4 +124,4 @@ def _read(folder: Path, channel: str) -> Telemetry:
             f"Expected finite values. Received: NaN or infinity in {path}. Clean it and save it "
             "again."
         )
-    return Telemetry.of(values, name=channel)
+    return values[:, None]

@@ -45,17 +45,20 @@ def test_sequences_that_share_a_sample_are_joined_and_neighbours_are_not(make):
     }
 
 
+def load(channel, folder):
+    return load_channel(folder, channel, read_labels(folder)[channel])
+
+
 def test_channels_by_hand(make):
     folder = make()
-    channel = load_channel(folder, "B-2")
-    np.testing.assert_array_equal(channel.train.values[:, 0], np.float32(np.arange(40) / 100))
-    assert (len(channel.test), channel.test.name) == (100, "B-2")
-    assert not channel.test.clock.has_time
+    train, test, sequences = load("B-2", folder)
+    np.testing.assert_array_equal(train[:, 0], np.float32(np.arange(40) / 100))
+    assert test.shape == (100, 1)
     # the file's ends are inside
-    assert channel.sequences == ((5, 6), (70, 80))
+    assert sequences == ((5, 6), (70, 80))
     np.save(folder / "test" / "C-3.npy", np.arange(60))  # no commands, and shorter than its label
-    channel = load_channel(folder, "C-3")
-    assert channel.sequences == ((0, 60),) and channel.test.values[:, 0].tolist() == list(range(60))
+    _, test, sequences = load("C-3", folder)
+    assert sequences == ((0, 60),) and test[:, 0].tolist() == list(range(60))
 
 
 @pytest.mark.parametrize(
@@ -79,13 +82,11 @@ def test_a_bad_folder_is_refused(make, tmp_path, refused):
         read_labels(make(header="channel,spacecraft,anomaly_sequences,class,num_values"))
     with refused("labelled channels"):
         read_labels(make([]))
-    with refused("'Z-9'"):
-        load_channel(make(), "Z-9")
     with refused("60 samples", "sample 70 of B-2"):
-        load_channel(make(num_test=60), "B-2")
+        load("B-2", make(num_test=60))
     np.save(tmp_path / "test" / "B-2.npy", np.where(np.eye(100) == 1, np.inf, 0))
     with refused("finite", "B-2.npy"):
-        load_channel(tmp_path, "B-2")
+        load("B-2", tmp_path)
     (tmp_path / "test" / "B-2.npy").unlink()
     with refused("B-2.npy"):
-        load_channel(tmp_path, "B-2")
+        load("B-2", tmp_path)
