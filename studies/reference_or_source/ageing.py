@@ -14,9 +14,9 @@ from studies.reference_or_source.cell_simulators import (
     fit_values,
     open_circuit_curve,
 )
-from studies.reference_or_source.detectors import MAIN, conformal_threshold
+from studies.reference_or_source.detectors import MAIN
 from studies.reference_or_source.inputs import inputs_of
-from studies.reference_or_source.judging import NONE, scores_of
+from studies.reference_or_source.judging import NONE, flagged, scores_of
 from studies.reference_or_source.real_cells import (
     JUDGED,
     KNOWN,
@@ -223,15 +223,9 @@ def _rows_of(
     """The rows of one cell, from the scores of its known and tested windows, and from those of its
     sisters, which set the threshold.
     """
-    limits = {
-        "found": conformal_threshold(np.concatenate(others), RATE),
-        "found_alike": float(np.quantile(known, 1 - RATE)),
-    }
     labels = _labels(_tested(cell))
     parts = [(KNOWN, 0.0, known)]
     for number, discharge in enumerate(_tested(cell)):
         parts.append((discharge.use, cell.loss(discharge), tested[labels == number]))
-    for kind, severity, scores in parts:
-        shares = {name: float(np.mean(scores > limit)) for name, limit in limits.items()}
-        about = {"group": cell.group, "cell": cell.name}
-        yield about | {"kind": kind, "severity": severity} | shares
+    for row in flagged(parts, np.concatenate(others), known, RATE):
+        yield {"group": cell.group, "cell": cell.name} | row

@@ -1,6 +1,6 @@
 """Rows of the table: for each use and detector the share of windows that are flagged."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -54,18 +54,34 @@ def judged(windows: Judged, scores: Scores) -> list[dict[str, Any]]:
         that flags `RATE` of the nominal tested windows, so that uses can be compared at equal false
         alarms.
     """
-    nominal = scores.tested[windows.labels < 0]
-    limit = conformal_threshold(scores.known, RATE)
-    alike = float(np.quantile(nominal, 1 - RATE))
-    rows = []
-    for number, (kind, severity) in enumerate(((NOMINAL, 0.0), *windows.faults), -1):
-        here = scores.tested[windows.labels == number]
-        rows.append(
-            {
-                "kind": kind,
-                "severity": severity,
-                "found": float(np.mean(here > limit)),
-                "found_alike": float(np.mean(here > alike)),
-            }
-        )
-    return rows
+    parts = [
+        (kind, severity, scores.tested[windows.labels == number])
+        for number, (kind, severity) in enumerate(((NOMINAL, 0.0), *windows.faults), -1)
+    ]
+    return list(flagged(parts, scores.known, parts[0][2], RATE))
+
+
+def flagged(
+    parts: Iterable[tuple[str, float, np.ndarray]],
+    known: np.ndarray,
+    alike: np.ndarray,
+    rate: float,
+) -> Iterator[dict[str, Any]]:
+    """The shares of scores beyond thresholds.
+
+    Args:
+        parts: Kind, severity and scores of each part of what is judged.
+        known: Scores that set the threshold of `found`.
+        alike: Scores of which that of `found_alike` flags the rate.
+        rate: Share of false alarms.
+
+    Yields:
+        A row for each part.
+    """
+    limits = {
+        "found": conformal_threshold(known, rate),
+        "found_alike": float(np.quantile(alike, 1 - rate)),
+    }
+    for kind, severity, scores in parts:
+        shares = {name: float(np.mean(scores > limit)) for name, limit in limits.items()}
+        yield {"kind": kind, "severity": severity} | shares
