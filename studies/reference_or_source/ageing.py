@@ -1,6 +1,7 @@
 """Real cells as a system of the study: ageing is the fault, and sisters set the thresholds."""
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -96,9 +97,9 @@ def family_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
             continue
         curve = open_circuit_curve(cells, group)
         parts = {cell.name: windows_of(cell, simulator, FIRST_VALUES, curve) for cell in sisters}
-        for with_sisters, number in [(True, each) for each in FEW] + [
-            (False, each) for each in FEW if each
-        ]:
+        for with_sisters, number in itertools.product((True, False), FEW):
+            if not with_sisters and not number:
+                continue
             level = f"{'sisters' if with_sisters else 'alone'} and {number}"
             for cell in sisters:
                 others = [sister.name for sister in sisters if sister is not cell]

@@ -64,19 +64,23 @@ ONE_CLASS: dict[str, Callable[[int], Any]] = {
 
 
 def across_folds(
-    make: Callable[[int], Any], windows: np.ndarray, folds: np.ndarray, seed: int
+    learn: Callable[[np.ndarray | None], Any], windows: np.ndarray, folds: np.ndarray
 ) -> tuple[Any, np.ndarray]:
-    """Fits a detector to all windows, and scores each of them by one that has not learnt from its
-    fold.
+    """Scores each window by a detector that has not learnt from its fold.
+
+    Args:
+        learn: Returns a detector that has learnt from some windows, a mask; None: from all.
+        windows: What is scored.
+        folds: Fold of each window.
 
     Returns:
-        The detector, and the scores.
+        The detector that has learnt from all windows, and the scores.
     """
 
     def score(learnt: np.ndarray, held_out: np.ndarray) -> np.ndarray:
-        return np.asarray(make(seed).fit(windows[learnt]).score(windows[held_out]), np.float64)
+        return np.asarray(learn(learnt).score(windows[held_out]), np.float64)
 
-    return make(seed).fit(windows), by_fold(folds, score)
+    return learn(None), by_fold(folds, score)
 
 
 def conformal_threshold(scores: np.ndarray, rate: float) -> float:

@@ -25,7 +25,7 @@ NUM_FLIGHTS = 6
 FAULT = Fault("left engine", 0.6)
 _PERIOD_S = 3_600  # from the start of a flight to that of the next
 _TELEMETRY_DIGITS = (2, 0, 2, 1, 1, 0)
-_SIMULATOR_DIGITS = (2, 0, 2, 1, 1, 0, 0, 0)
+_SIMULATOR_DIGITS = (*_TELEMETRY_DIGITS, 0, 0)
 
 
 def tables(seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> dict[str, pd.DataFrame]:

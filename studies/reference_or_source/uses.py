@@ -13,7 +13,8 @@ thresholds set alike.
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -64,10 +65,9 @@ class Comparison:
         self._maps: dict[bytes, Map] = {}
 
     def scores(
-        self, uses: tuple[str, ...], detectors: Sequence[str] | None = None
+        self, uses: tuple[str, ...], detectors: Iterable[str] = ONE_CLASS
     ) -> Iterator[Scores]:
-        """Scores of some detectors (None: all) in some uses."""
-        detectors = tuple(ONE_CLASS) if detectors is None else detectors
+        """Scores of some detectors in some uses."""
         known = self.windows.known
         tested = self.windows.tested
         number = known.telemetry.shape[2]
@@ -83,24 +83,25 @@ class Comparison:
             NO_SIMULATOR: lambda: (known.telemetry, tested.telemetry),
             COMMANDS: self._less_commands,
             ONE_STEP: self._less_autoregression,
+            SOURCE: lambda: (known.telemetry, tested.telemetry),
         }
         for use in (use for use in signals if use in uses):
-            learnt, judged = signals[use]()
+            signal, judged = signals[use]()
             for name in detectors:
-                make = ONE_CLASS[name]
-                fitted, scores = across_folds(make, learnt, known.folds, self.seed)
-                yield Scores(use, name, scores, fitted.score(judged))
-        if SOURCE in uses:
-            for name in detectors:
-                scores = by_fold(
-                    known.folds,
-                    lambda rows, held_out, name=name: self._learn_generated(name, rows).score(
-                        known.telemetry[held_out]
-                    ),
-                )
-                yield Scores(
-                    SOURCE, name, scores, self._learn_generated(name, None).score(tested.telemetry)
-                )
+                yield self._scores(use, name, signal, judged)
+
+    def _scores(self, use: str, name: str, signal: np.ndarray, judged: np.ndarray) -> Scores:
+        """Scores of one detector, from the known windows of a use and from those that it judges."""
+
+        def learn(rows: np.ndarray | None) -> Any:
+            if use == SOURCE:
+                windows = self._generated(rows)
+            else:
+                windows = signal if rows is None else signal[rows]
+            return ONE_CLASS[name](self.seed).fit(windows)
+
+        fitted, scores = across_folds(learn, signal, self.windows.known.folds)
+        return Scores(use, name, scores, fitted.score(judged))
 
     @functools.cached_property
     def residuals(self) -> np.ndarray:
@@ -122,13 +123,13 @@ class Comparison:
             self._maps[key] = fit_map(some.coarse, some.telemetry, some.starts)
         return self._maps[key](coarse)
 
-    def _learn_generated(self, name: str, rows: np.ndarray | None) -> object:
-        """Fits a detector to windows that were generated from some known windows; None: all."""
+    def _generated(self, rows: np.ndarray | None) -> np.ndarray:
+        """Windows that are generated from some known windows; None: from all."""
         rng = np.random.default_rng([self.seed, 200, 1])
         residuals = self.residuals if rows is None else self.residuals[rows]
         nominal = self.enhance(self.windows.source, rows)
         noise = residuals[rng.integers(0, len(residuals), len(nominal))]
-        return ONE_CLASS[name](self.seed).fit(nominal + noise)
+        return nominal + noise
 
     def _less_commands(self) -> tuple[np.ndarray, np.ndarray]:
         """Known and tested telemetry less a ridge regression on the commands.
