@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from studies.common.detectors import Detector, LargestStep, MovingDeviation
+from studies.common.detectors import Control, Detector, LargestStep, MovingDeviation
 
 
-class RandomScore:
+class RandomScore(Control):
     """Random scores, independent of the windows. Each call continues the random sequence.
 
     Args:
@@ -16,10 +16,6 @@ class RandomScore:
 
     def __init__(self, seed: int = 0):
         self._rng = np.random.default_rng(seed)
-
-    def fit(self, windows: np.ndarray) -> "RandomScore":
-        """Does nothing, because this control has no parameters to fit."""
-        return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns random numbers that are uniformly distributed between 0 and 1."""

@@ -110,17 +110,17 @@ class JointMeans:
         return self._covariance.mahalanobis(means) / means.shape[1]
 
 
-class _Control:
+class Control:
     """A trivial detector without anything to learn. Anomalies that it finds are trivial to detect
     (Wu and Keogh 2021).
     """
 
-    def fit(self, windows: np.ndarray) -> "_Control":
+    def fit(self, windows: np.ndarray) -> "Control":
         """Does nothing."""
         return self
 
 
-class LargestStep(_Control):
+class LargestStep(Control):
     """Control: the largest absolute first difference."""
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -130,7 +130,7 @@ class LargestStep(_Control):
         return np.abs(np.diff(windows, axis=1)).reshape(len(windows), -1).max(axis=1)
 
 
-class MovingDeviation(_Control):
+class MovingDeviation(Control):
     """Control: the largest standard deviation of 25 neighbouring samples."""
 
     def score(self, windows: np.ndarray) -> np.ndarray:

@@ -90,17 +90,14 @@ class KeptTables:
         """
         import pandas as pd
 
-        missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
+        paths = {name: folder / f"{name}.parquet" for name in (*self.names, *self.former)}
+        missing = [name for name in self.names if not paths[name].is_file()]
         if missing:
             raise InputError(
                 f"Expected the tables of the study in {folder}. Received: no "
                 f"{missing[0]}.parquet. Run {self.command}."
             )
-        there = [
-            *self.names,
-            *(name for name in self.former if (folder / f"{name}.parquet").is_file()),
-        ]
-        tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in there}
+        tables = {name: pd.read_parquet(path) for name, path in paths.items() if path.is_file()}
         for table in tables.values():
             for column in set(self.labels) & set(table.columns):
                 table[column] = table[column].astype(str)  # categories back to strings

@@ -17,6 +17,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from studies.common.controls import RandomScore
+from studies.common.detectors import Control
 from studies.public_benchmarks.methods import (
     Method,
     OnWindows,
@@ -79,12 +80,8 @@ class PCAError:
         return np.mean((apart - apart @ self._axes.T @ self._axes) ** 2, axis=1)
 
 
-class MovingDeviation:
+class MovingDeviation(Control):
     """Standard deviation within a window, of several channels the largest."""
-
-    def fit(self, windows: np.ndarray) -> "MovingDeviation":
-        """Does nothing."""
-        return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the deviation of each window."""

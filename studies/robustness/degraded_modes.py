@@ -44,7 +44,6 @@ class DegradedModes:
     """
 
     def __init__(self, replicate: Replicate):
-        self.replicate = replicate
         self.settings = replicate.settings
         self.stages = replicate.stages
         self.example = replicate.example
