@@ -11,12 +11,10 @@ from enhsim_tf.cli.shared import (
     refuse_same_file,
 )
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import InputError, counted, named, spoken
+from enhsim_tf.common.errors import MANY, InputError, counted, named, spoken
 from enhsim_tf.datasets.inject import inject
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.telemetry.cleaning.report import lines_of
-
-_MANY = 8  # files, above which what is alike is said once
 
 
 def run_inject(options: argparse.Namespace) -> int:
@@ -33,7 +31,7 @@ def run_inject(options: argparse.Namespace) -> int:
     paths = output_paths(options.out, files, suffixes)
     refuse_same_file(paths.values(), options.source)
 
-    many = len(files) > _MANY
+    many = len(files) > MANY
     written = []
     constant = []
 

@@ -24,7 +24,7 @@ import pandas as pd
 import pyarrow as pa
 
 from enhsim_tf.coarse.degraded import Degraded
-from enhsim_tf.common.atomic_files import make_folder, replace_file
+from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.columns import apart_from
 from enhsim_tf.telemetry.placing import PlacedEvent
 
@@ -131,7 +131,7 @@ def write_table(path: str | os.PathLike, frame: pd.DataFrame, timeeval: Sequence
     complete.
 
     Args:
-        path: Path of the file.
+        path: Path of the file, in an existing folder.
         frame: The table. Its index becomes the first column.
         timeeval: Names of the channels, to write TimeEval's CSV (Wenig, Schmidl and Papenbrock,
             VLDB 2022) instead: `timestamp`, in UTC without a zone, or sample numbers or seconds;
@@ -149,7 +149,6 @@ def write_table(path: str | os.PathLike, frame: pd.DataFrame, timeeval: Sequence
         }
         marks = frame["mask"].to_numpy().astype(np.int8)
         table = pd.DataFrame({"timestamp": times, **values, "is_anomaly": marks})
-    make_folder(Path(path).parent)
     with replace_file(path) as temporary:
         if Path(path).suffix == ".csv":
             table.to_csv(temporary, index=False)

@@ -3,14 +3,14 @@ the labels of the run.
 """
 
 import os
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from enhsim_tf.common.atomic_files import make_folder, replace_file
+from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.columns import apart_from
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.scoring.trusted_range import TrustedRange
@@ -38,7 +38,7 @@ def write_copies(
     `(channel)` or `(run)`.
 
     Args:
-        path: Path of the file.
+        path: Path of the file, in an existing folder.
         model: A simulator of recorded runs.
         run: The run, for example of a fault.
         num_copies: Number of copies, each with another draw of noise.
@@ -54,8 +54,10 @@ def write_copies(
             f"Expected 1 copy or more, and at most {_MOST_ROWS:,} rows. Received: {num_copies:,} "
             f"copies, {num_rows:,} rows."
         )
-    time, others = _shared_columns(model, usable)
-    names = _value_columns(model)
+    names = ["value"]
+    if len(model.channels) > 1:
+        names = list(apart_from(_OURS, model.channels).values())
+    time, others = _shared_columns(model, usable, names)
 
     def table_of(number: int, values: np.ndarray) -> pa.Table:
         columns = {"copy": pa.array(np.full(len(values), number, np.int32)), **time}
@@ -66,7 +68,6 @@ def write_copies(
     about = {"interval_s": repr(model.interval_s), "channel": ", ".join(model.channels)}
     empty = table_of(0, np.zeros((len(usable), len(names)), np.float32))
     schema = empty.schema.with_metadata(about)
-    make_folder(Path(path).parent)
     with (
         replace_file(path) as temporary,
         pq.ParquetWriter(temporary, schema, compression="zstd") as writer,
@@ -76,20 +77,13 @@ def write_copies(
     return num_rows
 
 
-def _value_columns(model: EnhancedSimulator) -> list[str]:
-    """The columns of the values of each channel."""
-    if len(model.channels) == 1:
-        return ["value"]
-    return list(apart_from(_OURS, model.channels).values())
-
-
 def _shared_columns(
-    model: EnhancedSimulator, usable: Telemetry
+    model: EnhancedSimulator, usable: Telemetry, names: Sequence[str]
 ) -> tuple[dict[str, pa.Array], dict[str, pa.Array]]:
     """Returns the columns that are the same in every copy: the times, and the score of the range
-    with what is carried.
+    with what is carried, under names apart from those of the channels' columns.
     """
-    carried = apart_from((*_OURS, *_value_columns(model)), list(usable.parts[0].carried), "run")
+    carried = apart_from((*_OURS, *names), list(usable.parts[0].carried), "run")
     times = usable.clock.nanoseconds(usable.time_s + model.alignment.delay_s)
     stamps = (
         pa.array(times / 1e9)
