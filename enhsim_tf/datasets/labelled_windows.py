@@ -3,7 +3,7 @@ each shard to a file of its own.
 
 The windows of a shard depend only on the plan and the number of the shard, which has a random seed
 of its own. The bytes of a shard are therefore the same in every worker and in every order of
-generation. Two plans with the same `plan_key` describe the same shards.
+generation. Two plans with the same `Plan.key` describe the same shards.
 """
 
 import contextlib
@@ -13,7 +13,7 @@ import hashlib
 import importlib.metadata
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,10 +71,8 @@ class Plan:
     @property
     def shares(self) -> list[float]:
         """Shares of the nominal windows and of those of each scenario."""
-        return [
-            self.nominal_share,
-            *[(1 - self.nominal_share) / len(self.scenarios) for _ in self.scenarios],
-        ]
+        others = [(1 - self.nominal_share) / len(self.scenarios) for _ in self.scenarios]
+        return [self.nominal_share, *others]
 
     @property
     def num_shards(self) -> int:
@@ -103,13 +101,13 @@ class Plan:
         }
         return json.loads(json.dumps(settings))
 
-
-def plan_key(settings: Mapping[str, Any]) -> str:
-    """Returns the checksum of all settings except the number of windows. Shards with equal key,
-    number and size have identical bytes.
-    """
-    others = {name: value for name, value in settings.items() if name != "windows"}
-    return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
+    def key(self) -> str:
+        """Returns the checksum of all settings except the number of windows. Shards with equal key,
+        number and size have identical bytes.
+        """
+        settings = self.settings()
+        del settings["windows"]
+        return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
 def make_plan(
@@ -186,7 +184,7 @@ def write_windows(
     """
     about = {
         "format": FORMAT,
-        _KEY: plan_key(plan.settings()),
+        _KEY: plan.key(),
         "interval_s": repr(plan.interval_s),
         "channel": ", ".join(plan.channels),
     }
@@ -220,7 +218,7 @@ def finished_shards(folder: Path, plan: Plan) -> Iterator[tuple[int, str]]:
     """Yields number and checksum of the shards whose files are there and have the key and the
     number of windows of the plan.
     """
-    key = plan_key(plan.settings()).encode()
+    key = plan.key().encode()
     for shard in range(plan.num_shards):
         path = folder / shard_file(shard)
         with contextlib.suppress(OSError, pa.ArrowException):  # no file, or one that is damaged

@@ -21,7 +21,6 @@ from enhsim_tf.datasets.labelled_windows import (
     ShardMaker,
     draw_scenarios,
     make_plan,
-    plan_key,
     shard_file,
     systematic,
     write_windows,
@@ -128,7 +127,7 @@ def test_other_programs_can_read_the_file(tmp_path):
     types = [str(schema.field(name).type) for name in LABELS[:4]]
     assert types == ["string", "float", "int32", "int32"]
     assert schema.metadata[b"interval_s"] == b"2.0" and schema.metadata[b"channel"] == b"volts"
-    assert schema.metadata[b"settings"].decode() == plan_key(some.settings())
+    assert schema.metadata[b"settings"].decode() == some.key()
     assert 0 < pq.read_table(tmp_path / "x", filters=[("scenario", "==", "stuck")]).num_rows <= 25
     assert [path.name for path in tmp_path.iterdir()] == ["x"]
 
