@@ -102,7 +102,7 @@ def parse_length(text: str) -> tuple[float, str]:
     """
     match = _LENGTH.fullmatch(text.casefold())
     length = float(match["number"]) if match else 0.0
-    if not 0 < length < float("inf"):
+    if length == 0:
         raise InputError(
             "Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: "
             f"{text[:80]!r}."
