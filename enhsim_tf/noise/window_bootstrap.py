@@ -72,14 +72,13 @@ class WindowBootstrap:
         see `generate`.
         """
         window = self.windows.shape[1]
-        follows = self.signals is not None
         fade = window // 4
         hop = window - fade
         # samples before the first one, so that every sample has the same distribution
         lead = fade + int(rng.integers(0, hop))
         starts = hop * np.arange(-(-(num_samples + lead) // hop)) - lead
         below = None
-        if follows:
+        if self.signals is not None:
             signal = _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(
                 np.float32
             )

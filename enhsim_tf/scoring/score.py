@@ -141,7 +141,7 @@ def score(
     channels = [simulator.channels[number] for number in simulator.places_of(telemetry.columns)]
     scorer = scorer_of(simulator, options, channels)
     values = telemetry.values
-    scores, outside = np.full((2, len(values)), np.nan)
+    scores = np.full(len(values), np.nan)
     flags = np.zeros(len(values), bool)
     enhanced = np.full(values.shape, np.nan, np.float32)
     explained = simulator.explained_series(paired)
@@ -161,10 +161,6 @@ def score(
             f"Expected a part of at least one window of {scorer.window} samples. Received: "
             f"{counted(max(map(len, telemetry.parts)), 'sample')}. Give more telemetry."
         )
-    if paired.run is not None:
-        trusted = TrustedRange(simulator)
-        for place, coarse in zip(places, paired.run.parts, strict=True):
-            outside[place : place + len(coarse)] = trusted.score_run(coarse.values)
     if len(simulator.channels) == 1:
         of_run = ["enhanced"]
         names = {channels[0]: "value"}
@@ -172,11 +168,15 @@ def score(
         of_run = [f"enhanced {name}" for name in channels]
         names = apart_from((*_OURS, *of_run), channels)
     columns = dict(zip(names.values(), values.T, strict=True))
-    if run is not None:
+    results = {"score": scores, "flag": flags}
+    if paired.run is not None:
         columns |= dict(zip(of_run, enhanced.T, strict=True))
-    columns |= {"score": scores, "flag": flags}
-    columns |= {} if run is None else {"out_of_range": outside}
-    frame = pd.DataFrame(columns, index=telemetry.index)
+        outside = np.full(len(values), np.nan)
+        trusted = TrustedRange(simulator)
+        for place, coarse in zip(places, paired.run.parts, strict=True):
+            outside[place : place + len(coarse)] = trusted.score_run(coarse.values)
+        results["out_of_range"] = outside
+    frame = pd.DataFrame(columns | results, index=telemetry.index)
     window = scorer.window
     num_nominal = sum(
         len(spans_of(part, flags_of(part, window), window))
