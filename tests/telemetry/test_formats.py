@@ -135,6 +135,30 @@ def test_deep_json_is_refused(tmp_path, refused):
             read_source(tmp_path / name)
 
 
+def test_lists_inside_of_one_json_record_are_a_table(tmp_path):
+    frame = FRAME.astype({"time": str})
+    wide = {"id": 7, "hourly": {"unit": "V", **frame.to_dict("list")}}
+    fed = {"channel": {"id": 7}, "feeds": frame.to_dict("records")}
+    for record in (frame.to_dict("list"), wide, fed):
+        (tmp_path / "a.json").write_text(json.dumps(record))
+        (telemetry,) = read_telemetry(tmp_path / "a.json")
+        expected = FRAME[list(telemetry.columns)].to_numpy(np.float32)
+        assert set(telemetry.columns) == set(FRAME) - {"time"}
+        np.testing.assert_array_equal(telemetry.values, expected)
+
+
+def test_one_of_several_lists_of_records_is_chosen_by_name(tmp_path, refused):
+    records = FRAME.astype({"time": str}).to_dict("records")
+    (tmp_path / "a.json").write_text(json.dumps({"one": records, "two": {"x": records[::-1]}}))
+    with refused("--table one, or --table two.x"):
+        read_telemetry(tmp_path / "a.json")
+    (telemetry,) = read_telemetry(tmp_path / "a.json", Cleaning(table="one"))
+    assert len(telemetry) == len(FRAME)
+    (tmp_path / "a.json").write_text(json.dumps(records))
+    with refused("Leave it out"):
+        read_telemetry(tmp_path / "a.json", Cleaning(table="one"))
+
+
 def test_an_answer_of_prometheus_says_what_makes_a_table_of_it(tmp_path):
     values = [[1_709_251_200 + 15 * row, str(row / 4)] for row in range(20)]
     answer = {"status": "success", "data": {"result": [{"metric": {}, "values": values}]}}

@@ -45,8 +45,8 @@ def read_parquet(content: bytes, name: str, options: Cleaning) -> Table:
 
 
 def read_json(content: bytes, name: str, options: Cleaning) -> Table:
-    """Reads JSON lines, one record each, or one list of records; what is inside of others is named
-    `outer.inner`.
+    """Reads JSON lines, one record each, one list of records, or columns as lists; what is inside
+    of others is named `outer.inner`.
     """
     with reading(name):
         text = content.decode("utf-8-sig").strip()
@@ -54,14 +54,43 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
         lines = [text] if is_whole else text.splitlines()
         records = [json.loads(line) for line in lines if line.strip()]
     if len(records) == 1 and isinstance(records[0], dict):
+        with reading(name):
+            lists = _lists_of(records[0])
+        if lists:
+            return _of_arrays(lists, name, options)
         names = ", ".join(records[0])
         raise InputError(
             f"Expected records, one in each line, or a list of them. Received: one record in "
             f"{name}, of {names:.80}.",
             otherwise=_OF_JSON,
         )
+    if options.table is not None:
+        raise InputError(
+            "Expected table (--table) with lists inside of one record. Received: a table of "
+            f"records, {name}. Leave it out."
+        )
     with reading(name):
         return Table(pd.json_normalize(records[0] if is_whole else records))
+
+
+def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str], np.ndarray]:
+    """Returns the lists inside of a record, and the columns of its lists of records and of lists,
+    by the name of what holds them and their own.
+    """
+    lists: dict[tuple[str, str], np.ndarray] = {}
+    for key, value in record.items():
+        inside = f"{group}.{key}".strip(".")
+        if isinstance(value, dict):
+            lists |= _lists_of(value, inside)
+        elif isinstance(value, list) and value:
+            is_records = isinstance(value[0], dict)
+            frame = pd.json_normalize(value) if is_records else pd.DataFrame(value)
+            if frame.map(lambda cell: isinstance(cell, list | dict)).any(axis=None):
+                continue
+            for name, column in frame.items():
+                names = (group, key if frame.shape[1] == 1 else f"{key}.{name}")
+                lists[(inside, name) if is_records else names] = column.to_numpy()
+    return lists
 
 
 def read_excel(content: bytes, name: str, options: Cleaning) -> Table:
@@ -214,7 +243,7 @@ READERS: dict[str, Callable[[bytes, str, Cleaning], Table]] = {
     ".json": read_json,
 }
 """The readers by the endings of files; those of all others are text."""
-HAS_TABLES = (".xlsx", ".xlsm", ".mat", ".h5", ".hdf5")
+HAS_TABLES = (".xlsx", ".xlsm", ".mat", ".h5", ".hdf5", ".json")
 """Endings of files that may hold several tables."""
 CONVERT = {
     ".mf4": "asammdf",
