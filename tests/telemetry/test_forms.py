@@ -338,6 +338,12 @@ ASKED = {
         {"time": "T"},
         5,
     ),
+    "a ramp in front of each signal": (
+        table("t1,v,t2,w", 5 * np.arange(N), VALUES, 2 * np.arange(N), VALUES),
+        "--time t2 --column w",
+        {"time": "t1", "columns": ["v"]},
+        5,
+    ),
     "days of a spreadsheet": (
         table("Date,v", [f"{45352 + second / 86400:.8f}" for second in SECONDS], VALUES),
         "excel from 2024-03-01",

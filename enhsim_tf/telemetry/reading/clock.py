@@ -229,9 +229,19 @@ def _refuse_unknown(
         for name, each in numbers.items()
         if is_epoch(each) and np.ptp(each) > 0 <= np.diff(each).min()
     )
-    ramp = next(
-        (name for name, values in numbers.items() if _is_regular(values)), next(in_order, None)
-    )
+    groups = _behind(kinds, {name for name, values in numbers.items() if _is_regular(values)})
+    if (
+        len(groups) > 1
+        and all(groups.values())
+        and next(iter(kinds)) in groups
+        and not all(_is_nearly(numbers[next(iter(groups))], numbers[name]) for name in groups)
+    ):
+        raise InputError(
+            f"Expected to know the clock. Received: {', '.join(list(groups)[:4])} of {what}, which "
+            "increase in equal steps, each with signals of its own.",
+            [*({"time": name, "columns": group} for name, group in groups.items()), _COUNT],
+        )
+    ramp = next(iter(groups), next(in_order, None))
     if ramp is not None and sum(kind == "numbers" for kind in kinds.values()) > 1:
         step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
         raise InputError(
@@ -343,12 +353,12 @@ def refuse_own_clocks(
     """Refuses signals that each have a clock of their own in front of them, unless those of one
     clock are asked for.
     """
-    groups: dict[str, list[str]] = {}
-    for name in frame:
-        if kinds[name] == "dates" or name in numbers and _is_named_clock(name, numbers[name]):
-            groups[name] = []
-        elif groups and kinds[name] == "numbers":
-            groups[list(groups)[-1]].append(name)
+    clocks = {
+        name
+        for name in frame
+        if kinds[name] == "dates" or name in numbers and _is_named_clock(name, numbers[name])
+    }
+    groups = _behind(kinds, clocks)
     if len(groups) < 2 or not all(groups.values()) or frame.columns[0] not in groups:
         return
     first, *others = groups
@@ -367,6 +377,17 @@ def refuse_own_clocks(
             f"({', '.join(list(groups)[:4])}).",
             [{"time": name, "columns": group} for name, group in groups.items()],
         )
+
+
+def _behind(kinds: Mapping[str, str], clocks: Collection[str]) -> dict[str, list[str]]:
+    """Returns the columns of numbers behind each of some clocks, up to the next one."""
+    groups: dict[str, list[str]] = {}
+    for name, kind in kinds.items():
+        if name in clocks:
+            groups[name] = []
+        elif groups and kind == "numbers":
+            groups[list(groups)[-1]].append(name)
+    return groups
 
 
 def _is_named_clock(name: str, values: np.ndarray) -> bool:
