@@ -334,7 +334,7 @@ def _is_key(
 
 
 def _is_named(name: str) -> bool:
-    words = [word.casefold() for word in words_of(name)]
+    words = words_of(name)
     return bool(words) and (words[-1] in _KEYS or "".join(words) in _KEYS) and words[0] in _KEYS
 
 

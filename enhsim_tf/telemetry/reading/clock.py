@@ -81,12 +81,11 @@ class Clock(NamedTuple):
 
 
 def words_of(name: str) -> list[str]:
-    """Splits the name of a column into words of letters; capitals in the middle begin a word, as in
-    `OPCQuality`.
+    """Splits the name of a column into words of small letters; capitals in the middle begin a word,
+    as in `OPCQuality`.
     """
-    return re.findall(
-        r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", name)
-    )
+    split = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", name)
+    return [word.casefold() for word in re.findall(r"[^\W\d_]+", split)]
 
 
 def name_tells(name: str) -> tuple[int, str | None]:
@@ -96,21 +95,15 @@ def name_tells(name: str) -> tuple[int, str | None]:
     if name.casefold().strip() in ("x_value", "x-axis"):  # of LabVIEW and of oscilloscopes
         return 2, None
     words = words_of(name)
-    lower = [word.casefold() for word in words]
-    unit = next((_UNIT_OF[word] for word in reversed(lower) if word in _UNIT_OF), None)
-    unit = next((word for word in lower if word in _DAY_WORDS), unit)
+    unit = next((_UNIT_OF[word] for word in reversed(words) if word in _UNIT_OF), None)
+    unit = next((word for word in words if word in _DAY_WORDS), unit)
     bracket = bool(re.search(r"[(\[/]\s*[^\W\d_]+\s*[)\]]?\s*$", name))
-    if (
-        lower
-        and lower[0] in ("t", "x")
-        and len(lower) <= 2
-        and (words[0] == "t" or len(lower) == 2)
-    ):
-        if len(lower) == 1:
-            return (1, None) if re.fullmatch(r"\W*t\W*", name) else (0, None)
+    if re.fullmatch(r"\W*t\W*", name):
+        return 1, None
+    if len(words) == 2 and words[0] in ("t", "x"):
         return (2, unit) if unit and bracket else (0, None)
-    is_known = all(word in _TIMES or word in _BESIDE or word in _UNIT_OF for word in lower)
-    return (2, unit) if is_known and any(word in _TIMES for word in lower) else (0, None)
+    is_known = all(word in _TIMES or word in _BESIDE or word in _UNIT_OF for word in words)
+    return (2, unit) if is_known and any(word in _TIMES for word in words) else (0, None)
 
 
 def _is_increasing(values: np.ndarray) -> bool:
@@ -165,7 +158,7 @@ def find_clock(
     may_be = {name for name in whole if _may_be_clock(tells[name], whole[name])}
     if fractions and not may_be:
         (seconds, rest), *_ = fractions
-        unit = _UNIT_OF[words_of(rest)[-1].casefold()]
+        unit = _UNIT_OF[words_of(rest)[-1]]
         added = pd.Series(pd.to_timedelta(numbers[rest], unit=unit))
         return Clock(fractions[0], pd.Series(numbers[seconds]), added)
     numbers = whole
@@ -314,9 +307,7 @@ def offset_of(
 
 def _without_ends(names: list[str]) -> list[str]:
     """Leaves out the ends of intervals beside their beginnings."""
-    return [
-        name for name in names if not _ENDS & {word.casefold() for word in words_of(name)}
-    ] or names
+    return [name for name in names if _ENDS.isdisjoint(words_of(name))] or names
 
 
 def _fractions(numbers: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
@@ -325,7 +316,7 @@ def _fractions(numbers: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
     """
     stems: dict[tuple[str, ...], str] = {}
     for name in numbers:
-        *stem, last = [word.casefold() for word in words_of(name)] or [""]
+        *stem, last = words_of(name) or [""]
         stems[(*stem, _UNIT_OF.get(last, ""))] = name
     pairs = []
     for (*stem, unit), name in stems.items():
@@ -428,10 +419,9 @@ def further_clocks(
         )
     known = np.where(times.stamps.isna(), np.nan, times.stamps.as_unit("ns").asi8.astype(float))
     for name, values in numbers.items():
-        split = words_of(name)
-        words = {word.casefold() for word in split}
+        words = set(words_of(name))
         is_named = name_tells(name)[0] > 0 or words and words <= _BESIDE.union(_UNIT_OF)
-        is_named = is_named or split[:1] == ["t"]  # t-Step[s] of battery cyclers
+        is_named = is_named or re.match("t(?![a-z])", name)  # t-Step[s] of battery cyclers
         if (
             name not in clock.columns
             and (is_named or is_epoch(values))
@@ -504,8 +494,8 @@ def _joined(
         parts = {part: name for part, name in parts.items() if part == "ms"}
     elif not is_day or "hour" not in parts:
         parts = {}
-    texts = hours if is_day else []
-    if texts:
+    texts: list[str] = []
+    if hours and is_day:
         texts = hours + [
             name
             for name, kind in kinds.items()

@@ -261,7 +261,7 @@ def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
 
 
 def _words_of(name: str) -> set[str]:
-    split = [word.casefold() for word in words_of(name)]
+    split = words_of(name)
     return {*split, *("".join(pair) for pair in zip(split, split[1:], strict=False))}
 
 
@@ -290,7 +290,7 @@ def _labels_of(
 
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
     """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
-    words = {word.casefold() for word in words_of(name)}
+    words = set(words_of(name))
     if not (_UNNAMED(name) or words and words <= _ROWS):
         return False
     return len(values) == 1 or bool(len(values)) and bool(np.mean(np.diff(values) == 1) >= 0.9)
