@@ -65,20 +65,18 @@ def parse_numbers(
         findings for the cleaning log.
     """
     values = as_column(values, what)
-    is_plain = pd.api.types.is_numeric_dtype(values.dtype) and values.dtype.kind not in "bc"
-    if not (is_plain or is_text(values)):
+    plain = is_plain(values)
+    if not (plain or is_text(values)):
         raise InputError(
             f"Expected numbers. Received: dtype {values.dtype} from {what}.",
             [{"states": True}] if values.dtype == bool else (),
             "a numeric column",
         )
     cells = (
-        pd.Series(values.to_numpy(np.float64, na_value=np.nan))
-        if is_plain
-        else values.astype(object)
+        pd.Series(values.to_numpy(np.float64, na_value=np.nan)) if plain else values.astype(object)
     )
     cells, findings = _without(cells, missing_values)
-    if is_plain:
+    if plain:
         parsed = cells.to_numpy()
         bad = np.zeros(len(cells), bool)
     else:
@@ -118,6 +116,11 @@ def as_column(values: Any, what: str) -> pd.Series:
             f"Expected one plain column. Received: {type(values).__name__} from {what} ({reason}). "
             "Name one column."
         ) from None
+
+
+def is_plain(values: pd.Series) -> bool:
+    """Whether a column holds real numbers, which need not be parsed."""
+    return pd.api.types.is_numeric_dtype(values.dtype) and values.dtype.kind not in "bc"
 
 
 def is_text(values: pd.Series) -> bool:

@@ -21,6 +21,7 @@ from enhsim_tf.telemetry.cleaning.numbers import (
     as_column,
     format_cell,
     is_missing,
+    is_plain,
     is_text,
     parse_numbers,
 )
@@ -107,11 +108,7 @@ def parse_times(
         return reader.of_dates(times)
     if pd.api.types.is_timedelta64_dtype(kind):
         return reader.of_numbers(times.dt.total_seconds(), "s")
-    if (
-        pd.api.types.is_bool_dtype(kind)
-        or not (pd.api.types.is_numeric_dtype(kind) or is_text(times))
-        or kind.kind == "c"
-    ):
+    if not (is_plain(times) or is_text(times)):
         raise InputError(
             f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another "
             "time column."

@@ -11,7 +11,13 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
+from enhsim_tf.telemetry.cleaning.numbers import (
+    has_commas,
+    is_missing,
+    is_plain,
+    is_text,
+    parse_numbers,
+)
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import (
     DURATION,
@@ -208,8 +214,7 @@ def _kind_of(cells: pd.Series) -> str:
     if pd.api.types.is_bool_dtype(kind):
         return "words"
     if not is_text(cells):
-        is_number = pd.api.types.is_numeric_dtype(kind) and kind.kind != "c"
-        return "objects" if not is_number else "numbers" if cells.notna().any() else "empty"
+        return "objects" if not is_plain(cells) else "numbers" if cells.notna().any() else "empty"
     for some in (cells.iloc[: 10 * LOOK], cells):
         given = some[~is_missing(some)].iloc[:LOOK]
         if len(given):
