@@ -89,14 +89,14 @@ def clean(
             "a time column, or leave it out."
         )
     else:
-        log = CleaningLog(None, raw.findings, raw.places)
+        log = CleaningLog(list(raw.findings), raw.places)
         found = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
         log.findings.insert(0, found)
         numbers = np.arange(len(values))
         rows = pd.DataFrame(
             {"time": (numbers + raw.first) * UNITS_NS["s"], "value": values, "row": numbers}
         )
-    log.findings += noted
+    log.findings.extend(noted)
 
     base = int(rows["time"].iloc[0])
     parts, used, interval = regularise(
@@ -142,7 +142,7 @@ def _rows_with_times(
     local = raw.times.stamps.tz is None
     times, kept, since = _in_order(raw.times, options.timezone if local else None)
     has_time = times != pd.NaT.value
-    log = CleaningLog(times, raw.findings, raw.places, counts)
+    log = CleaningLog(list(raw.findings), raw.places, times, counts)
     for kind, mask, text in (
         ("bad times", bad, "rows whose time cannot be read"),
         ("missing times", ~had_time & ~bad, "rows without a time"),
@@ -152,7 +152,7 @@ def _rows_with_times(
             f"rows at ambiguous or nonexistent local times of {options.timezone}",
         ),
     ):
-        log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}", rows_left_out=int(mask.sum()))
+        log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}")
     if not len(kept):
         raise InputError(
             f"Expected rows with times. Received: none in {raw.name}. Name another time column."

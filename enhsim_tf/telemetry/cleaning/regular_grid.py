@@ -95,9 +95,8 @@ def regularise(
                 "--fill hold for telemetry that is sent only when it changes",
             )
         other = np.flatnonzero(_have_other_rate(times, interval))
-        if (
-            len(other) and not holds and not by_interval
-        ):  # a long step of telemetry that is held is no slower rate
+        # a long step of telemetry that is held is no slower rate
+        if len(other) and not by_interval:
             by_interval = True
             usual = f"one every {interval / 1e9:.6g} s, to which they are averaged or filled"
             log.add(
@@ -209,7 +208,7 @@ def _drop_missing_values(
             "rows without a value (NaN, infinite or empty), taken as gaps: {count}",
         ),
     ):
-        log.add(kind, numbers, text, rows_left_out=len(numbers))
+        log.add(kind, numbers, text)
     if not has_value.any():
         raise InputError(
             f"Expected values. Received: only missing ones in {name}. Choose another channel."
@@ -227,12 +226,7 @@ def _drop_duplicate_times(
         return rows
     is_copy = rows.duplicated(["time", "value"])
     copies = rows["row"][is_copy].to_numpy()
-    log.add(
-        "duplicate rows",
-        copies,
-        "rows that repeat the time and value of another: {count}",
-        rows_left_out=len(copies),
-    )
+    log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}")
     rows = rows[~is_copy]
     kept, left = _merge_groups(rows, ["time"], options.same_time)
     if (
@@ -252,7 +246,7 @@ def _drop_duplicate_times(
         f"rows with another value at the same time, of which the {options.same_time} was taken: "
         f"{{count}}"
     )
-    log.add("same time", left, text, rows_left_out=len(left))
+    log.add("same time", left, text)
     return kept
 
 
@@ -375,12 +369,12 @@ def _build_parts(
     _log_jitter(rows, interval, log)
     rows, merged = _merge_groups(rows, ["part", "place"], how)
     text = f"rows that share an interval with another row, of which the {how} was taken: {{count}}"
-    log.add("averaged", merged, text, rows_left_out=len(merged))
+    log.add("averaged", merged, text)
     text = (
         f"rows in parts of fewer than {options.min_part:,} samples "
         f"({counted(is_short.sum(), 'such part')}): {{count}}"
     )
-    log.add("short parts", short, text, rows_left_out=len(short))
+    log.add("short parts", short, text)
     parts = []
     holds = options.fill == "hold"
     for number, inside in rows.groupby("part"):

@@ -189,24 +189,15 @@ def _alike(
     return shared
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class CleaningLog:
-    """The log of cleaning actions: collects findings with their places in the source.
+    """The log of cleaning actions: collects findings with their places in the source."""
 
-    `times` are those of all rows in the order of the source, int64 nanoseconds since 1970, or None;
-    `findings` are those made while reading; `counts` as in `times.Times`.
-    """
-
-    def __init__(
-        self,
-        times: np.ndarray | None,
-        findings: Sequence[Finding] = (),
-        places: Places = ROWS,
-        counts: bool = False,
-    ):
-        self.times = times
-        self.places = places
-        self.counts = counts
-        self.findings = list(findings)
+    findings: list[Finding]  # those made while reading come first
+    places: Places = ROWS
+    # of all rows in the order of the source, int64 nanoseconds since 1970; None without a clock
+    times: np.ndarray | None = None
+    counts: bool = False  # as in `times.Times`
 
     def place(self, row: int) -> str:
         """Describes a row of the source by its place and its time."""
@@ -225,13 +216,13 @@ class CleaningLog:
         **numbers: Any,
     ) -> None:
         """Adds a finding made at rows of the source, unless its count, by default the number of
-        these rows, is 0.
+        these rows, is 0. What is left out are rows, which are not represented by a sample then.
 
         `{count}` in the text becomes the count; `numbers` are the other fields of the `Finding`.
         """
         count = len(rows) if count is None else count
         if count:
+            text = text.replace("{count}", f"{count:,}")
             places = tuple(self.place(row) for row in rows[:_NUM_PLACES])
-            self.findings.append(
-                Finding(kind, int(count), text.replace("{count}", f"{count:,}"), places, **numbers)
-            )
+            left_out = int(count) if KINDS[kind] == "left out" else 0
+            self.findings.append(Finding(kind, int(count), text, places, left_out, **numbers))
