@@ -58,15 +58,14 @@ class Clock:
         try:
             stamp = pd.Timestamp(start if start[0].isdigit() else None)  # it would accept "now"
             stamp = stamp.tz_localize("UTC") if stamp.tz is None else stamp.tz_convert("UTC")
-            if not abs(stamp.timestamp()) < _MAX_S:
-                raise ValueError
+            start_ns = stamp.as_unit("ns").value
         except (ValueError, TypeError, AttributeError, IndexError):
             raise InputError(
                 "Expected start as an ISO 8601 time from 1678 to 2261. Received: "
                 f"{str(start)[:80]!r}. Correct it."
             ) from None
         kind = COUNTED if stamp.year == 1970 else DATES
-        return cls(interval_s, stamp.as_unit("ns").value, kind)
+        return cls(interval_s, start_ns, kind)
 
     @property
     def has_time(self) -> bool:

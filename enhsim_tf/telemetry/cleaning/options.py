@@ -20,7 +20,7 @@ DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_52
 MATLAB.
 """
 _MAX_FILL = {"linear": 5, "hold": 1_000_000}
-_NAMES = ("label_column", "series_column")
+_LISTS = ("label_column", "series_column", "missing_values")  # one, or several
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,16 +147,11 @@ class Cleaning:
                 "or one of: "
                 f"{', '.join(units)}. Received: time_format={form!r}."
             )
-        for name in _NAMES:
+        for name in _LISTS:
             given = getattr(self, name)
             if given is not None:
-                object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
-        given = self.missing_values
-        object.__setattr__(
-            self,
-            "missing_values",
-            (given,) if isinstance(given, str | float | int) else tuple(given),
-        )
+                several = (given,) if isinstance(given, str | float | int) else tuple(given)
+                object.__setattr__(self, name, several)
 
     @property
     def longest_gap(self) -> int:
