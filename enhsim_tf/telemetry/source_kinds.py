@@ -41,10 +41,11 @@ def existing(source: str | os.PathLike | Sequence[str | os.PathLike]) -> str | P
     paths = [
         Path(os.fspath(each)) if isinstance(each, str | os.PathLike) else None for each in source
     ]
-    if not paths or None in paths or not all(map(os.path.isfile, paths)):
-        wrong = next((path for path in paths if path is None or not os.path.isfile(path)), None)
+    wrong = [path for path in paths if path is None or not os.path.isfile(path)]
+    if wrong or not paths:
+        received = next(iter(wrong), None) or type(next(iter(source), source)).__name__
         raise InputError(
             "Expected files that exist, as several sources are files of one table. Received: "
-            f"{wrong or type(next(iter(source), source)).__name__}. Give one source."
+            f"{received}. Give one source."
         )
-    return paths
+    return paths if len(paths) > 1 else paths[0]

@@ -62,16 +62,13 @@ def read_source(
         raise InputError(
             f"Expected columns of different names. Received: columns={columns}. Name each once."
         )
-    if isinstance(source, pd.DataFrame | pd.Series):
-        return read_table_channels(source, columns, time, options)
-    path = existing(source)
-    if isinstance(path, str):
-        return _read_influx(path, columns, time, options)
-    if isinstance(path, list):
-        return read_table_channels(path if len(path) > 1 else path[0], columns, time, options)
-    if path.suffix.lower() == ".npy" and not path.is_dir():
-        return _read_array(path, columns, time)
-    return read_table_channels(path, columns, time, options)
+    if not isinstance(source, pd.DataFrame | pd.Series):
+        source = existing(source)
+    if isinstance(source, str):
+        return _read_influx(source, columns, time, options)
+    if isinstance(source, Path) and source.suffix.lower() == ".npy" and not source.is_dir():
+        return _read_array(source, columns, time)
+    return read_table_channels(source, columns, time, options)
 
 
 def read_telemetry(
@@ -97,8 +94,9 @@ def read_telemetry(
     """
     cleaning = cleaning or Cleaning()
     channels = read_source(source, columns, time, cleaning)
-    cleaned = {name: clean(raw, cleaning, describe=False) for name, raw in channels.items()}
-    return join_channels({name: channel.telemetry for name, channel in cleaned.items()})
+    return join_channels(
+        {name: clean(raw, cleaning, describe=False).telemetry for name, raw in channels.items()}
+    )
 
 
 def _read_influx(
