@@ -192,24 +192,25 @@ def _read_rows(
     """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
     names = dialect.names
     if dialect.separator == "," and b'"' not in data:
-        return _parse(data, dialect, name, decimal), decimal  # no cell has a comma
+        return _parse(data, dialect, decimal), decimal  # no cell has a comma
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
-    sign = decimal or ("," if any(_shows_comma(head[column]) for column in head) else None)
+    sign = decimal or ("," if any(shows_comma(_some(head[column])) for column in head) else None)
     if sign is None and dialect.separator == ";":
         sign = _sign_of_country(head, names, name)
-    frame = _parse(data, dialect, name, sign)
+    frame = _parse(data, dialect, sign)
     if sign is None and any(
-        is_text(frame[column]) and _shows_comma(frame[column]) for column in frame
+        is_text(frame[column]) and shows_comma(_some(frame[column])) for column in frame
     ):
         sign = ","
-        frame = _parse(data, dialect, name, sign)
+        frame = _parse(data, dialect, sign)
     if sign == "," and decimal is None:
         _check_points(frame, names, name)
     return frame, sign
 
 
-def _shows_comma(cells: pd.Series) -> bool:
-    return shows_comma(cells.iloc[:: max(1, len(cells) // _LOOK)].dropna().astype("str"))
+def _some(cells: pd.Series) -> pd.Series:
+    """Returns cells from all over a column as text."""
+    return cells.iloc[:: max(1, len(cells) // _LOOK)].dropna().astype("str").str.strip()
 
 
 def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str | None:
@@ -242,9 +243,7 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
     for column in frame:
         if not is_text(frame[column]):
             continue
-        cells = (
-            frame[column].iloc[:: max(1, len(frame) // _LOOK)].dropna().astype("str").str.strip()
-        )
+        cells = _some(frame[column])
         points = cells[cells.str.fullmatch(r"[+-]?\d+\.\d+").to_numpy(bool)]
         if len(points) > len(cells) / 2 and not allows_point_thousands(points):
             raise InputError(
@@ -254,7 +253,7 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
             )
 
 
-def _parse(data: bytes, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
+def _parse(data: bytes, dialect: Dialect, decimal: str | None) -> pd.DataFrame:
     width = len(dialect.names)
     is_blanks = dialect.separator == BLANKS
     head = b"\n" + data[:_HEAD]
@@ -265,8 +264,6 @@ def _parse(data: bytes, dialect: Dialect, name: str, decimal: str | None) -> pd.
         "names": range(width),
         "index_col": False,
         "low_memory": False,
-    }
-    options |= {
         "skip_blank_lines": is_blanks,
         "decimal": decimal or ".",
         # it costs a fifth of the time
