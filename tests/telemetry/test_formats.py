@@ -135,6 +135,21 @@ def test_deep_json_is_refused(tmp_path, refused):
             read_source(tmp_path / name)
 
 
+def test_texts_of_fixed_length_in_records_of_hdf5_are_times(tmp_path):
+    stamps = pd.date_range("2024-03-01", periods=len(FRAME), freq="min")
+    stamps = np.array(stamps.strftime("%Y-%m-%dT%H:%M:%S"), "S19")
+    fields = [("time", "S19"), *((name, "f8") for name in FRAME if name != "time")]
+    records = np.empty(len(FRAME), fields)
+    for name in FRAME:
+        records[name] = stamps if name == "time" else FRAME[name]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["log"] = records
+    (telemetry,) = read_telemetry(tmp_path / "a.h5")
+    expected = FRAME[list(telemetry.columns)].to_numpy(np.float32)
+    np.testing.assert_array_equal(telemetry.values, expected)
+    assert (telemetry.start, telemetry.interval_s) == ("2024-03-01T00:00:00+00:00", 60.0)
+
+
 def test_lists_inside_of_one_json_record_are_a_table(tmp_path):
     frame = FRAME.astype({"time": str})
     wide = {"id": 7, "hourly": {"unit": "V", **frame.to_dict("list")}}

@@ -344,6 +344,14 @@ ASKED = {
         {"time": "t1", "columns": ["v"]},
         5,
     ),
+    "times of day without colons from midnight": (
+        table(
+            "Time,v",
+            [f"{number // 60:02}{number % 60:02}00" for number in 7 * SECONDS // 60],
+            VALUES,
+        ),
+        "times of day or seconds",
+    ),
     "days of a spreadsheet": (
         table("Date,v", [f"{45352 + second / 86400:.8f}" for second in SECONDS], VALUES),
         "excel from 2024-03-01",
@@ -1022,3 +1030,23 @@ def test_rows_without_the_word_of_others_are_a_series():
 )
 def test_the_size_of_a_number_says_the_unit_of_a_time_since_1970(size, unit):
     assert epoch_unit(size) == unit
+
+
+def test_rows_that_were_chosen_from_a_frame_are_no_channel():
+    frame = pd.DataFrame({"time": TIMES, "v": VALUES})
+    assert list(read_source(frame[frame["v"] > 16])) == ["v"]
+
+
+def test_an_index_may_be_named_like_a_column(refused):
+    frame = pd.DataFrame({"time": TIMES, "v": VALUES}).set_index("time", drop=False)
+    with refused("--time time.1"):
+        read_source(frame)
+    assert list(read_source(frame, time="time.1")) == ["v"]
+
+
+def test_a_short_row_below_no_header_moves_no_value(tmp_path, refused):
+    rows = table("", SECONDS, VALUES, VALUES).strip().splitlines()
+    rows[20] = rows[20].rpartition(",")[0]
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    with refused("line 21"):
+        read_source(tmp_path / "a.csv", options=Cleaning(no_header=True))

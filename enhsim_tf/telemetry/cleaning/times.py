@@ -310,8 +310,7 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
         found["decimal years"] = ()
     minutes = values // 100 % 100
     if (
-        1e4 <= low
-        and high < 24e4
+        1e4 <= high < 24e4
         and low // 100 < high // 100
         and max((values % 100).max(), minutes.max()) < 60
     ):

@@ -232,7 +232,8 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
         units = rows[header + 1] if header + 1 < top else []
     head = [row for row in rows[begin:] if row]
     mark = "," if mark == _WHOLE else mark
-    return Dialect(mark, names, begin, skipped, head, units, lacks or not names[-1])
+    may_lack_last = lacks or any(names) and not names[-1]
+    return Dialect(mark, names, begin, skipped, head, units, may_lack_last)
 
 
 def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:

@@ -111,7 +111,10 @@ def _with_plain_columns(table: Table, name: str) -> Table:
     """Turns an index that means something into a column, and names into text."""
     frame = table.frame
     # the rows of a slice are counted from 0 as well
-    frame = frame.reset_index(drop=isinstance(frame.index, pd.RangeIndex))
+    is_counted = isinstance(frame.index, pd.RangeIndex)
+    if frame.index.nlevels == 1 and frame.index.name is None:
+        frame = frame.rename_axis("column 0")  # as in text
+    frame = frame.reset_index(drop=is_counted, allow_duplicates=True)
     if frame.columns.nlevels > 1:
         raise InputError(
             f"Expected one line of column names. Received: {frame.columns.nlevels} levels in "

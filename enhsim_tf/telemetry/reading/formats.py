@@ -183,6 +183,8 @@ def _of_arrays(arrays: Mapping[tuple[str, str], np.ndarray], name: str, options:
     tables: dict[tuple[str, int], dict[str, Any]] = {}
     for (group, key), values in arrays.items():
         values = np.squeeze(values)
+        if values.dtype.kind == "S":
+            values = np.char.decode(values, "utf-8", "replace")
         if values.ndim not in (1, 2) or len(values) < 2 or values.dtype.kind not in "fiubUOM":
             continue
         columns = tables.setdefault((group, len(values)), {})
