@@ -54,6 +54,7 @@ class Report:
     noise_model: str
     cross_correlation: CrossCorrelation | None  # of several channels
     false_alarms: float  # share of that time above the threshold of `score`, see `alarms_of`
+    set_for: float  # the share for which the threshold is set, larger where telemetry is short
     # of each view, the share of held-out time beyond its nominal quantile
     views: dict[str, float]
     # of recorded runs, the share of that time outside the training range of the coarse columns
@@ -101,7 +102,8 @@ class Report:
         if self.false_alarms > _MOST_ALARMS:
             said.append(
                 f"WARNING: {self.false_alarms:.0%} of {'held-out ' * self.is_held_out}nominal time "
-                f"are above the threshold, which is set for {RATE:.0%}: it has left what was "
+                f"are above the threshold, which is set for "
+                f"{100 * self.set_for:.2g}%: it has left what was "
                 "learnt. Expect false alarms, or fit to more telemetry"
             )
         worse = [
@@ -146,7 +148,7 @@ class Report:
         shares = ", ".join(f"{name} {share:.1%}" for name, share in self.views.items())
         return (
             f"views there: {self.false_alarms:.1%} above the threshold of their sum, set for "
-            f"{RATE:.0%}"
+            f"{100 * self.set_for:.2g}%"
         ) + f"; beyond their quantiles of {RATE:.0%}: {shares}" * bool(shares)
 
     def _of_cross_correlation(self) -> str:
@@ -214,6 +216,7 @@ def make_report(simulator: EnhancedSimulator, fitted: Fitted, noise: str) -> Rep
         noise_model=noise,
         cross_correlation=_cross_correlation(simulator.channels, left, generated),
         false_alarms=false_alarms,
+        set_for=scorer.rate,
         views=views,
         outside=_share_outside(simulator, judged),
         examples={

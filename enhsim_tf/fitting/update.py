@@ -69,7 +69,7 @@ class UpdateReport:
             lines.append(f"{name}: {', '.join(parts)}")
         lines.append(
             f"{all_of_them}: samples above the threshold {self.before.alarms:.1%} -> "
-            f"{self.after.alarms:.1%}, set for 1 %"
+            f"{self.after.alarms:.1%}"
         )
         return [printable(line) for line in lines]
 

@@ -28,7 +28,8 @@ class Event:
 
     Args:
         begin: Estimated onset, the first sample that is anomalous.
-        end: The first sample after the last score above the threshold.
+        end: The first sample after the last score above the threshold; of a `NEW` operating point,
+            after the last flag.
         detected: The sample with which a scorer that has seen only the past raises the alarm.
         peak: The sample with the highest score since `begin`.
         num_flagged: Number of flagged samples.
@@ -54,7 +55,7 @@ class Event:
 
 def flags_of(scores: np.ndarray, window: int) -> np.ndarray:
     """Returns which samples of a series without gaps are flagged: those whose score is above the
-    threshold, 1, and by a twentieth above all scores of the last `MEMORY` windows but the last one,
+    threshold, 1, and by a twentieth above all scores of the `MEMORY` windows that end before those
     with which it shares samples.
 
     So telemetry that leaves what was learnt and stays there is flagged when it leaves, and again

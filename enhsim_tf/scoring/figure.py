@@ -54,11 +54,9 @@ def score_figure(scored: ScoredTelemetry, name: str) -> matplotlib.figure.Figure
     sheet = Sheet(frame.index, scored.clock, [*channels, "score"], title, subtitle, "score")
     *_, last = sheet.axes
     for axes, channel in zip(sheet.axes, channels, strict=False):
-        column = scored.columns[channel]
-        sheet.curve(axes, frame[column], REAL, 0.6)
-        enhanced = "enhanced" if column == "value" else f"enhanced {channel}"
-        if enhanced in frame:
-            sheet.curve(axes, frame[enhanced], ENHANCED, 1.0)
+        sheet.curve(axes, frame[scored.columns[channel]], REAL, 0.6)
+        if channel in scored.enhanced:
+            sheet.curve(axes, frame[scored.enhanced[channel]], ENHANCED, 1.0)
             title_words(
                 axes,
                 [("telemetry", REAL), ("enhanced run", ENHANCED)] if axes is sheet.axes[0] else [],

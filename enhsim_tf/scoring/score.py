@@ -53,6 +53,7 @@ class ScoredTelemetry:
         false_alarms_per_day: Expected number on the nominal telemetry, and the limits of its 95 %
             interval.
         not_judged: Names of channels of the simulator that the telemetry does not have.
+        enhanced: With a run, the column of the enhanced signal of each channel.
     """
 
     table: pd.DataFrame
@@ -63,6 +64,7 @@ class ScoredTelemetry:
     false_alarm_rate: float = 0.01
     false_alarms_per_day: tuple[float, float, float] = (0.0, 0.0, 0.0)
     not_judged: tuple[str, ...] = ()
+    enhanced: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     @property
     def departure(self) -> str:
@@ -162,15 +164,15 @@ def score(
             f"{counted(max(map(len, telemetry.parts)), 'sample')}. Give more telemetry."
         )
     if len(simulator.channels) == 1:
-        of_run = ["enhanced"]
+        of_run = {channels[0]: "enhanced"}
         names = {channels[0]: "value"}
     else:
-        of_run = [f"enhanced {name}" for name in channels]
-        names = apart_from((*_OURS, *of_run), channels)
+        of_run = {name: f"enhanced {name}" for name in channels}
+        names = apart_from((*_OURS, *of_run.values()), channels)
     columns = dict(zip(names.values(), values.T, strict=True))
     results = {"score": scores, "flag": flags}
     if paired.run is not None:
-        columns |= dict(zip(of_run, enhanced.T, strict=True))
+        columns |= dict(zip(of_run.values(), enhanced.T, strict=True))
         outside = np.full(len(values), np.nan)
         trusted = TrustedRange(simulator)
         for place, coarse in zip(places, paired.run.parts, strict=True):
@@ -192,6 +194,7 @@ def score(
         scorer.rate,
         false_alarms_per_day(num_nominal, seconds),
         tuple(name for name in simulator.channels if name not in channels),
+        of_run if paired.run is not None else {},
     )
 
 

@@ -18,7 +18,7 @@ from enhsim_tf.scoring.scorer import Scorer
 from enhsim_tf.scoring.views import VIEWS
 from enhsim_tf.telemetry.placing import PlacedEvent
 from enhsim_tf.telemetry.series import Clock, Part
-from tests.fitted_simulators import QUICK, joint, series
+from tests.fitted_simulators import QUICK, coarse_run, joint, series
 
 
 @pytest.mark.parametrize("kind", ["single", "both", "of_run"])
@@ -59,6 +59,20 @@ def test_the_shown_window_does_not_depend_on_the_unit_of_a_channel():
     quick = dataclasses.replace(QUICK, num_windows=100)
     shown = [fit(each, options=quick)[1].examples["real"][:, 0] for each in (telemetry, other)]
     np.testing.assert_array_equal(*shown)
+
+
+def test_the_report_says_the_rate_that_a_short_series_allows():
+    simulator, report = fit(series(1_000), options=QUICK)
+    rate = score(simulator, series(1_000)).false_alarm_rate
+    assert report.set_for == rate > 0.02
+    assert any(f"set for {100 * rate:.2g}%" in line for line in report.lines())
+
+
+def test_the_enhanced_signal_is_drawn_whatever_the_channels_are_called():
+    telemetry = dataclasses.replace(joint(seed=1), columns=("value", "enhanced"))
+    simulator, _ = fit(telemetry, coarse_run(), options=QUICK)
+    *channels, _ = score_figure(score(simulator, telemetry, coarse_run()), "pair").axes
+    assert [len(axes.lines) for axes in channels] == [2, 2]
 
 
 def test_correlations_by_hand():

@@ -82,7 +82,7 @@ def test_a_noise_model_is_added(followed, monkeypatch, tmp_path):
 
 
 def test_a_view_is_added(followed, monkeypatch):
-    name, entry = followed("Add a view", "enhsim_tf.scoring.range_view")
+    name, entry = followed("Add a view", "enhsim_tf.scoring.views")
     check_view(entry)
     monkeypatch.setitem(VIEWS, name, entry)
     assert name in Scorer([series().values]).names
