@@ -1,8 +1,8 @@
 """What the paper claims: for each claim its sentence, how it is measured, the limits that decide,
 and the verdict.
 
-A claim is reproduced if all its limits hold, partly if the basic ones hold, and otherwise not.
-Other limits are shown beside the verdict and do not enter it. Each limit is a distance from an
+A claim is reproduced if its limits hold, partly if the basic ones hold, and otherwise not. Limits
+that are only shown stand beside the verdict and do not enter it. Each limit is a distance from an
 ideal value, so that all can be halved or doubled. They were fixed before the runs that they judge;
 `docs/report.md` says which differ from those of an earlier run.
 """
@@ -299,7 +299,7 @@ def half_and_most(worse: list[float], key: str = "") -> Measured:
 
 def settling(pipeline: Pipeline) -> Measured:
     """C4: how wrong the generated noise is around the paper's number of iterations, compared with
-    half of it and with up to twice as many.
+    the first half of it and with the last quarter of twice as many.
 
     Wrong is the larger one of two errors, of the standard deviation in units of 10 % and of the
     lag-1 correlation in units of .05; each is the mean over the records of a stretch of training,
@@ -326,7 +326,7 @@ def settling(pipeline: Pipeline) -> Measured:
 
 def balance(pipeline: Pipeline) -> Measured:
     """C5: shares of rows that the discriminator classifies correctly in the first and in the second
-    half of training.
+    half of the paper's number of iterations.
     """
     history = pipeline.history
     rows = pipeline.settings.rows
@@ -712,7 +712,9 @@ def judge(claim: Claim, measured: Measured) -> dict[str, Any]:
 
 
 def _deciding(limits: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """The first basic limit that fails, or else the first other one, or else the last limit."""
+    """The first basic limit that fails, or else the first other one that does, or else the last
+    that could.
+    """
     counted = [limit for kind in (BASIC, WHOLE) for limit in limits if limit["decides"] == kind]
     failed = [limit for limit in counted if not limit["holds"]]
     if failed:

@@ -174,15 +174,16 @@ class NoiseGAN(keras.Model):
         # data set and the generated data set"
         number = self.settings.rows_of_each_kind
         real = tf.reshape(real, (number, self.settings.window, 1))
+        # as the author's `predict`: batch normalisation by its moving statistics
         generated = self.generator(self.draw_latent(number), training=False)
 
         # "It then trains on the entire batch (200 rows) of real and generated data."
         if self.settings.update == "two of 200":  # the author's code
             self.train_discriminator(real, labels(number, REAL))
             self.train_discriminator(generated, labels(number, GENERATED))
-        else:
-            both = tf.concat([labels(number, REAL), labels(number, GENERATED)], 0)
-            self.train_discriminator(tf.concat([real, generated], 0), both)
+        else:  # the paper's text
+            tags = tf.concat([labels(number, REAL), labels(number, GENERATED)], 0)
+            self.train_discriminator(tf.concat([real, generated], 0), tags)
 
         # "the discriminator's weights are frozen, and the generator is trained as part of the
         # entire GAN model"

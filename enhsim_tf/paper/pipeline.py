@@ -1,7 +1,7 @@
-"""Figure 1: the pipeline, "steps involved in the process" 1 to 9 and "Combined", each kept as a
-stage.
+"""Figure 1: the pipeline, "steps involved in the process" 1 to 9 and "Combined".
 
-Nothing is computed before it is asked for, so a figure trains only the networks that it shows.
+The telemetry and both trained networks are kept as stages. Nothing is computed before it is asked
+for, so a figure trains only the networks that it shows.
 """
 
 import functools
@@ -226,8 +226,8 @@ class Pipeline:
 
     @functools.cached_property
     def history(self) -> dict[str, np.ndarray]:
-        """Accuracy and loss of the discriminator, and `sd` and `lag_one` of generated noise, by
-        `iteration`.
+        """Losses of training, accuracy and loss of the discriminator, and `sd` and `lag_one` of
+        generated noise, by `iteration`; `real_sd` and `real_lag_one` of the real noise.
         """
         return load_arrays(self.gan_folder)
 

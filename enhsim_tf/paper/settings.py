@@ -1,5 +1,5 @@
-"""Every value of the reproduction: what the paper says, what the author's public code does, what is
-used here, and why.
+"""Every value that the paper gives or leaves open: what it says, what the author's public code
+does, what is used here, and why.
 
 A value comes from the paper's text. Where the text is silent, it comes from the author's public
 code; where that is silent too, it is Keras' default; a choice of this project needs a reason. The
@@ -37,7 +37,7 @@ def setting(
 
     Args:
         value: Its value at the full budget.
-        stages: The stages whose results depend on it, separated by commas.
+        stages: The groups of results that depend on it, separated by commas.
         source: `PAPER`, `AUTHOR` (a silence of which leaves Keras' default) or `OURS`.
         why: The section of the paper, the file of the author, or the reason.
         paper: What the paper says.

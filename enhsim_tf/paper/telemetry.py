@@ -29,7 +29,7 @@ class Telemetry:
     Args:
         values: float32 array of shape `(samples,)`.
         interval: Time between two samples in seconds.
-        start: Time of the first sample, ISO 8601 in UTC.
+        start: Time of the first sample of the whole series, ISO 8601 in UTC.
         name: Its name in the store.
         first: Number of samples before the first one, if this is a part of a series.
     """
