@@ -10,12 +10,14 @@ import tensorflow as tf
 from enhsim_tf.common import fast_keras
 from enhsim_tf.common.fast_keras import (
     convolution_maximum,
+    fit_blockwise,
     fused_adam,
     is_wide_dense_stack,
     with_fast_convolution,
 )
 from enhsim_tf.paper import noise as of_paper
-from studies.common.training import dense_stack, fit_windows
+from enhsim_tf.paper.enhancer import Pairs
+from studies.common.training import dense_stack
 from tests.paper.conftest import tiny_settings
 
 RNG = np.random.default_rng
@@ -47,6 +49,20 @@ def small_enhancer():
     return dense_stack(WINDOW, (WINDOW, UNITS, UNITS, WINDOW), seed=4, name="enhancer")
 
 
+def pairs(batch_size):
+    return Pairs(SOURCE, TARGET, batch_size, RNG(3))
+
+
+def trained(network, rate, epochs, batch_size):
+    """Trains by blocks if a kernel is wide, otherwise by Keras; returns the losses of the epochs."""
+    options = {"epochs": epochs, "verbose": 0, "shuffle": False}
+    if is_wide_dense_stack(network):
+        history = fit_blockwise(network, rate, "mean_squared_error", pairs(batch_size), **options)
+        return history["loss"]
+    network.compile(fused_adam(rate), loss="mean_squared_error", jit_compile=False)
+    return network.fit(pairs(batch_size), **options).history["loss"]
+
+
 # of a block; none divides the 20 rows of the widest kernel, and 400 are no block
 @pytest.mark.parametrize(
     ("rows", "batch_size", "rate"),
@@ -60,13 +76,9 @@ def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
     monkeypatch.setattr(fast_keras, "BLOCK_BYTES", 4 * UNITS * rows)
     network, plain = small_enhancer(), small_enhancer()
     assert is_wide_dense_stack(network) == (rows < UNITS)
-    found = fit_windows(network, SOURCE, TARGET, 3, batch_size, seed=3, learning_rate=rate())
+    found = trained(network, rate(), 3, batch_size)
     plain.compile(keras.optimizers.Adam(rate()), loss="mean_squared_error")
-    orders, losses = RNG(3), []
-    for _ in range(3):
-        order = orders.permutation(len(SOURCE))
-        rows = SOURCE[order], TARGET[order]
-        losses += plain.fit(*rows, batch_size, verbose=0, shuffle=False).history["loss"]
+    losses = plain.fit(pairs(batch_size), epochs=3, verbose=0, shuffle=False).history["loss"]
     np.testing.assert_allclose(found, losses, rtol=3e-6)
     for weight, of_plain in zip(network.get_weights(), plain.get_weights(), strict=True):
         np.testing.assert_allclose(weight, of_plain, atol=5e-6)
@@ -77,7 +89,7 @@ def test_the_same_seed_gives_the_same_weights(monkeypatch):
     monkeypatch.setattr(fast_keras, "BLOCK_BYTES", 4 * UNITS * 3)
     network, again = small_enhancer(), small_enhancer()
     for each in (network, again):
-        fit_windows(each, SOURCE, TARGET, 1, 20, seed=3, learning_rate=0.001)
+        trained(each, 0.001, 1, 20)
     for weight, same in zip(network.get_weights(), again.get_weights(), strict=True):
         np.testing.assert_array_equal(weight, same)
 
