@@ -102,9 +102,8 @@ class Report:
         if self.false_alarms > _MOST_ALARMS:
             said.append(
                 f"WARNING: {self.false_alarms:.0%} of {'held-out ' * self.is_held_out}nominal time "
-                f"are above the threshold, which is set for "
-                f"{100 * self.set_for:.2g}%: it has left what was "
-                "learnt. Expect false alarms, or fit to more telemetry"
+                f"are above the threshold, which is set for {100 * self.set_for:.2g}%: it has left "
+                "what was learnt. Expect false alarms, or fit to more telemetry"
             )
         worse = [
             f"{name} {error.enhanced:.3g}"

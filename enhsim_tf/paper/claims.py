@@ -1,10 +1,10 @@
 """What the paper claims: for each claim its sentence, how it is measured, the limits that decide,
 and the verdict.
 
-A claim is reproduced if its limits hold, partly if the basic ones hold, and otherwise not. Limits
-that are only shown stand beside the verdict and do not enter it. Each limit is a distance from an
-ideal value, so that all can be halved or doubled. They were fixed before the runs that they judge;
-`docs/report.md` says which differ from those of an earlier run.
+A claim is reproduced if all limits hold but those that are only shown, partly if the basic ones
+hold, and otherwise not. Each limit is a distance from an ideal value, so that all can be halved or
+doubled. They were fixed before the runs that they judge; `docs/report.md` says which differ from
+those of an earlier run.
 """
 
 import dataclasses

@@ -218,20 +218,21 @@ def _events(
         past = scorer.window_scores(seen[low : raised + window])
         is_under_way = flagged < window and past[0] > 1
         begin = flagged if is_under_way else low + onset_of(past, raised - low, window)
-        height = flagged + int(np.argmax(scores.samples[flagged:end]))
+        stop = max(end, begin + 1)
+        top = flagged + int(np.argmax(scores.samples[flagged:end]))
         # the windows that hold the first anomalous sample raise the scores of samples before it
-        peak = begin + int(np.argmax(scores.samples[begin : max(end, begin + 1)]))
+        peak = begin + int(np.argmax(scores.samples[begin:stop]))
         onset = min(begin, len(seen) - window)
         last = min(len(seen), onset + MEMORY * window, max(end, onset + window))
         firsts = range(onset, last - window + 1, window)
         shares = sum(scorer.shares(seen[first : first + window]) for first in firsts)
-        holds_peak = (scores.begins <= height) & (scores.begins > height - window)
-        by_view = max(scores.by_view.T[holds_peak], key=np.sum)
-        highest = float(scores.samples[height])
+        holds_top = (scores.begins <= top) & (scores.begins > top - window)
+        by_view = max(scores.by_view.T[holds_top], key=np.sum)
+        highest = float(scores.samples[top])
         events.append(
             Event(
                 place + begin,
-                place + max(end, begin + 1),
+                place + stop,
                 place + min(raised + window, len(seen)) - 1,
                 place + peak,
                 int(flags[flagged:end].sum()),

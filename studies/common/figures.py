@@ -10,7 +10,8 @@ from enhsim_tf.common.plot_style import DOUBLE
 
 
 def leave_room(grid: np.ndarray, left: float, width: float) -> None:
-    """Moves the panels of a figure of width `DOUBLE`, so that the labels of rows have room.
+    """Moves the panels of a figure of width `DOUBLE` to the right, so that the labels of its rows
+    fit beside them.
 
     Args:
         grid: Axes of shape `(rows, columns)`.

@@ -222,19 +222,15 @@ def _refuse_unknown(
         for name, each in numbers.items()
         if is_epoch(each) and np.ptp(each) > 0 <= np.diff(each).min()
     )
-    groups = _behind(kinds, {name for name, values in numbers.items() if _is_regular(values)})
-    if (
-        len(groups) > 1
-        and all(groups.values())
-        and next(iter(kinds)) in groups
-        and not all(_is_nearly(numbers[next(iter(groups))], numbers[name]) for name in groups)
-    ):
+    ramps = [name for name, values in numbers.items() if _is_regular(values)]
+    groups = _signals_of(kinds, ramps)
+    if not all(_is_nearly(numbers[ramps[0]], numbers[name]) for name in groups):
         raise InputError(
             f"Expected to know the clock. Received: {', '.join(list(groups)[:4])} of {what}, which "
             "increase in equal steps, each with signals of its own.",
             [*({"time": name, "columns": group} for name, group in groups.items()), _COUNT],
         )
-    ramp = next(iter(groups), next(in_order, None))
+    ramp = next(iter(ramps), next(in_order, None))
     if ramp is not None and sum(kind == "numbers" for kind in kinds.values()) > 1:
         step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
         raise InputError(
@@ -349,8 +345,8 @@ def refuse_own_clocks(
         for name in frame
         if kinds[name] == "dates" or name in numbers and _is_named_clock(name, numbers[name])
     }
-    groups = _behind(kinds, clocks)
-    if len(groups) < 2 or not all(groups.values()) or frame.columns[0] not in groups:
+    groups = _signals_of(kinds, clocks)
+    if not groups:
         return
     first, *others = groups
     if len({kinds[name] for name in groups}) > 1 or any(
@@ -370,15 +366,18 @@ def refuse_own_clocks(
         )
 
 
-def _behind(kinds: Mapping[str, str], clocks: Collection[str]) -> dict[str, list[str]]:
-    """Returns the columns of numbers behind each of some clocks, up to the next one."""
+def _signals_of(kinds: Mapping[str, str], clocks: Collection[str]) -> dict[str, list[str]]:
+    """Returns the columns of numbers behind each of several clocks, up to the next one; nothing
+    unless the first column is a clock and each clock has a signal.
+    """
     groups: dict[str, list[str]] = {}
     for name, kind in kinds.items():
         if name in clocks:
             groups[name] = []
         elif groups and kind == "numbers":
             groups[list(groups)[-1]].append(name)
-    return groups
+    is_whole = len(groups) > 1 and all(groups.values()) and next(iter(kinds)) in groups
+    return groups if is_whole else {}
 
 
 def _is_named_clock(name: str, values: np.ndarray) -> bool:
