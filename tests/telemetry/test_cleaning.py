@@ -373,6 +373,17 @@ def test_one_late_row_is_snapped_and_named(interval_s):
     )
 
 
+def test_rows_that_two_exports_share_are_merged_and_others_at_their_times_are_refused(refused):
+    rows = [*range(40), *range(20, 60)]
+    series = pd.Series(np.arange(60.0)[rows] % 7, pd.date_range("2024", periods=60, freq="s")[rows])
+    cleaned = clean(series)
+    assert cleaned.telemetry.values[:, 0].tolist() == [row % 7 for row in range(60)]
+    assert cleaned.report.find("duplicate rows").count == 20
+    series.iloc[40:60] += 1
+    with refused("cover the same time once more"):
+        clean(series)
+
+
 def test_steps_that_differ_are_rows_missing_and_no_other_rate():
     times = START + pd.to_timedelta(np.cumsum([1] * 200 + [3, 4] * 40), unit="s")
     assert cleaned_of(with_times(times, VALUES[: len(times)])).report.find("other rates") is None

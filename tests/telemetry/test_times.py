@@ -77,3 +77,25 @@ def test_a_step_back_by_a_day_or_an_hour_is_refused_unless_a_zone_is_known(refus
     with refused("row 2 of volts", "one day" if minutes[0] > 1_000 else "one hour"):
         refuse_steps_back(*given, has_zone=False)
     refuse_steps_back(*given, has_zone=True)
+
+
+@pytest.mark.parametrize(
+    ("minutes", "row", "words"),
+    [
+        ([*range(60), *range(20, 80)], 60, "cover the same time once more"),
+        ([minute for _ in range(6) for minute in range(20)], 20, "cover the same time once more"),
+        ([600, 660, 720, 60, 120, 180, 240], 3, "hours from 1 to 12"),
+    ],
+)
+@pytest.mark.parametrize("has_zone", [False, True])
+@pytest.mark.parametrize("order", [1, -1])
+def test_dates_that_begin_again_are_refused(refused, minutes, row, words, has_zone, order):
+    times = 60 * 10**9 * np.array(minutes)[::order]
+    with refused(f"row {row} of volts", words):
+        refuse_steps_back(times, np.arange(len(minutes))[::order], Log(), "volts", has_zone)
+
+
+@pytest.mark.parametrize("minutes", [1, 10, 20, 30, 60, 240, 720, 1_440])
+def test_dates_that_go_down_throughout_begin_nowhere_again(minutes):
+    times = 60 * 10**9 * minutes * np.arange(400)[::-1]
+    refuse_steps_back(times, np.arange(400), Log(), "volts", has_zone=False)

@@ -157,9 +157,12 @@ def _rows_with_times(
         raise InputError(
             f"Expected rows with times. Received: none in {raw.name}. Name another time column."
         )
-    if counts or local:
-        rows = np.flatnonzero(has_time)
-        refuse_steps_back(times[rows], rows, log, raw.name, options.timezone is not None)
+    if (np.diff(times[has_time]) <= 0).any():
+        # rows that are there twice, as where exports overlap, do no harm
+        twice = pd.DataFrame({"time": times, "value": values}).duplicated()
+        rows = np.flatnonzero(has_time & ~twice)
+        is_told = not local or options.timezone is not None
+        refuse_steps_back(times[rows], rows, log, raw.name, is_told)
     if local:
         zone = f"{options.timezone or 'UTC'}, as none is stated"
     elif options.timezone and zone != "none":

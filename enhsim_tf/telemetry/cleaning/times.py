@@ -57,6 +57,7 @@ _ISO = "ISO8601"
 _COMPACT = {7: "%Y%j", 8: "%Y%m%d", 10: "%Y%m%d%H", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 _MIDNIGHT = r"(?<=[T ])24(?=:00)"  # at the end of a day
 LOOK = 200  # number of cells that are inspected to find a form
+_MAX_JUMPS = 100  # above which times are in no order
 TIME_OF_DAY = (
     r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>[.,]\d+)?)?)(?P<half> ?[AaPp][Mm])?"
 )
@@ -502,15 +503,17 @@ def refuse_steps_back(
 ) -> None:
     """Refuses times that step back where sorting would mix what happened at different times.
 
-    These are times that count from zero and begin again, as after a restart, and, unless a zone is
-    given or stated, dates that step back by about one hour only, as a local clock does, by a day to
-    where there were none, as where the date of the first day stays past midnight, or over times
-    that they have shown before. `times` are nanoseconds in the order of the source, and `rows`
-    their rows there.
+    These are times that count from zero and begin again, as after a restart, dates that go back
+    over times that they have shown before, and, unless a zone is given or stated, dates that step
+    back by about one hour only, as a local clock does, or by a day to where there were none, as
+    where the date of the first day stays past midnight. `times` are nanoseconds in the order of the
+    source, and `rows` their rows there.
     """
     steps = np.diff(times)
-    if (steps > 0).all():
+    if (steps > 0).all() or (steps < 0).all():
         return
+    if np.median(steps) < 0:  # the latest comes first
+        times, rows, steps = times[::-1], rows[::-1], -steps[::-1]
     hour = UNITS_NS["h"]
     counting = [{"time": "none"}]
     options = [{"timezone": "UTC"}]
@@ -519,7 +522,8 @@ def refuse_steps_back(
     back = np.flatnonzero(steps < 0)
 
     def are(step: int) -> bool:
-        return len(back) > 0 and bool((np.abs(steps[back] + step) <= 2 * usual).all())
+        is_near = np.abs(steps[back] + step) < 2 * usual
+        return 3 * usual <= step and len(back) > 0 and bool(is_near.all())
 
     if log.counts:
         late = 10 * usual  # a single late row is followed by as long a step forward
@@ -531,25 +535,29 @@ def refuse_steps_back(
         how = "count from zero and begin again, as after a restart"
         options = counting
         otherwise = "the parts one by one"
-    elif has_zone:
-        return
-    elif usual >= hour / 2:  # a late row is no step back by an hour only on a Sunday morning
-        back = np.flatnonzero(np.abs(steps + hour - usual) <= 0.01 * usual)
-        stamps = pd.DatetimeIndex(times[back])
-        is_change = (stamps.day_of_week == 6) & (stamps.hour <= 3) & (usual <= hour)
-        back = back[is_change][:1]
-        how = "state no zone and repeat an hour, as local clocks do"
-    elif are(hour):
-        how = "state no zone and step back by one hour, as local clocks do"
-    elif are(UNITS_NS["D"]) and len(np.unique(times)) == len(times):
-        how = "state no zone and step back by one day, as where a date stays past midnight"
-        options += counting
-        otherwise = ""
     else:
-        back = jumps_back(times)
-        how = "go back and cover the same time once more, as where a clock was set"
-        options = counting
-        otherwise = "the parts one by one"
+        is_change = are(hour)
+        if usual >= hour / 2:  # a late row is no step back by an hour only on a Sunday morning
+            changes = np.flatnonzero(np.abs(steps + hour - usual) <= 0.01 * usual)
+            stamps = pd.DatetimeIndex(times[changes])
+            changes = changes[(stamps.day_of_week == 6) & (stamps.hour <= 3) & (usual <= hour)]
+            is_change = len(changes) > 0
+            back = changes if is_change else back
+        if is_change and not has_zone:
+            how = "state no zone and repeat one hour, as local clocks do"
+        elif are(UNITS_NS["D"]) and len(np.unique(times)) == len(times) and not has_zone:
+            how = "state no zone and step back by one day, as where a date stays past midnight"
+            options += counting
+            otherwise = ""
+        elif are(12 * hour):
+            how = "step back by half a day, as hours from 1 to 12 do"
+            options = counting
+            otherwise = "times with AM or PM"
+        else:
+            back = [] if is_change else jumps_back(times)
+            how = "go back and cover the same time once more, as where a clock was set"
+            options = counting
+            otherwise = "the parts one by one"
     if len(back):
         raise InputError(
             f"Expected ascending times. Received: times that {how}, at "
@@ -560,16 +568,18 @@ def refuse_steps_back(
 
 
 def jumps_back(times: np.ndarray) -> list[int]:
-    """Returns the rows, at most three, after which a clock goes back by far and runs on over times
-    that it has shown before. `times` are nanoseconds in the order of the source.
+    """Returns the rows, at most `_MAX_JUMPS`, after which a clock goes back by far and runs on over
+    times that it has shown before. `times` are nanoseconds in the order of the source.
     """
     steps = np.diff(times)
     jumps = np.flatnonzero(steps < -10 * np.median(np.abs(steps))) if len(steps) else steps
-    if not 1 <= len(jumps) <= 3:
+    if not 1 <= len(jumps) <= _MAX_JUMPS:
         return []
-    for begin, end in itertools.pairwise([*(jumps + 1), len(times)]):
-        run = times[begin:end]
-        again = (times[:begin] >= run.min()) & (times[:begin] <= run.max())
-        if again.sum() <= 10 or len(run) <= 10 or (np.diff(run) >= 0).mean() <= 0.9:
-            return []
-    return jumps.tolist()
+    again = []
+    for jump, end in itertools.pairwise([*jumps, len(times) - 1]):
+        run = times[jump + 1 : end + 1]
+        before = times[: jump + 1]
+        num_twice = ((before >= run.min()) & (before <= run.max())).sum()
+        if num_twice > 10 and len(run) > 10 and (np.diff(run) >= 0).mean() > 0.9:
+            again.append(int(jump))
+    return again if 2 * len(again) >= len(jumps) else []

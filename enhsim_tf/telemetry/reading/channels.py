@@ -357,8 +357,8 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
     """
     if _repeating(frame, [], times) <= _OFTEN:
         return
-    if jumps_back(times[times != pd.NaT.value]):
-        return  # which is said when the channels are cleaned
+    # where the clock was set, which is said when the channels are cleaned, a counter is no key
+    jumps = jumps_back(times[times != pd.NaT.value])
     for name in frame.columns.difference([*layout.clock.columns], sort=False):
         cells = frame[name]
         if (
@@ -366,6 +366,7 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
             and layout.channels != (name,)
             and 1 < cells.nunique() <= _MAX_SERIES
             and _repeating(frame, [name], times) < 0.02
+            and not 0 < len(jumps) < np.count_nonzero(np.diff(cells))
         ):
             raise InputError(
                 "Expected one row for each time. Received: times that repeat, with different "

@@ -85,7 +85,7 @@ def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str
         elif isinstance(value, list) and value:
             is_records = isinstance(value[0], dict)
             frame = pd.json_normalize(value) if is_records else pd.DataFrame(value)
-            cells = frame.select_dtypes("object")
+            cells = frame.loc[:, frame.dtypes == object]
             if cells.map(lambda cell: isinstance(cell, list | dict)).any(axis=None):
                 continue
             for name, column in frame.items():
