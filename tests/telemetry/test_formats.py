@@ -150,6 +150,58 @@ def test_texts_of_fixed_length_in_records_of_hdf5_are_times(tmp_path):
     assert (telemetry.start, telemetry.interval_s) == ("2024-03-01T00:00:00+00:00", 60.0)
 
 
+def test_units_beside_data_of_hdf5_are_those_of_the_clock(tmp_path, refused):
+    hdf5(tmp_path / "a.h5", log=FRAME)
+    for unit, interval_s in (("ms", 0.0005), (np.bytes_("min"), 30.0)):
+        with h5py.File(tmp_path / "a.h5", "r+") as file:
+            file["log/time"].attrs["units"] = unit
+        (telemetry,) = read_telemetry(tmp_path / "a.h5")
+        assert telemetry.interval_s == pytest.approx(interval_s)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value"), [("scale_factor", 0.1), ("units", "hours since 2024-01-01")]
+)
+def test_values_that_are_to_be_converted_are_refused(tmp_path, refused, attribute, value):
+    hdf5(tmp_path / "a.h5", log=FRAME)
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        file["log/time"].attrs[attribute] = value
+    with refused("log/time", "xarray"):
+        read_telemetry(tmp_path / "a.h5")
+
+
+def test_signals_of_a_simulation_are_read_with_their_time(tmp_path):
+    signals = np.empty(2, object)
+    signals[:] = [{"values": FRAME[name].to_numpy()[:, None]} for name in ("volts", "amps")]
+    for inside, one in ((signals, "1.values"), ({"values": FRAME.to_numpy()[:, 1:]}, "values.0")):
+        log = {"time": SECONDS, "signals": inside, "blockName": "model"}
+        scipy.io.savemat(tmp_path / "a.mat", {"log": log})
+        (telemetry,) = read_telemetry(tmp_path / "a.mat")
+        assert (telemetry.columns[0], telemetry.interval_s) == (f"signals.{one}", 0.5)
+        np.testing.assert_allclose(telemetry.values, FRAME[["volts", "amps"]], rtol=1e-6)
+
+
+def test_the_last_line_of_json_may_be_cut(tmp_path, refused):
+    text = FRAME.to_json(orient="records", lines=True)
+    (tmp_path / "a.jsonl").write_text(text + '{"time": 4')
+    channels = read_source(tmp_path / "a.jsonl")
+    assert len(channels["volts"].cells) == N
+    assert any(finding.kind == "ragged lines" for finding in channels["volts"].findings)
+    (tmp_path / "a.jsonl").write_text('{"time": 4\n' + text)
+    with refused("cannot be read"):
+        read_source(tmp_path / "a.jsonl")
+
+
+def test_lists_of_values_are_rows(tmp_path, refused):
+    rows = FRAME.to_numpy().tolist()
+    (tmp_path / "a.json").write_text(json.dumps([list(FRAME), *rows]))
+    (telemetry,) = read_telemetry(tmp_path / "a.json")
+    np.testing.assert_allclose(telemetry.values, FRAME[["volts", "amps"]], rtol=1e-6)
+    (tmp_path / "a.json").write_text(json.dumps([*rows, [40.0, 1.0]]))
+    with refused("lists of 2 to 3 values"):
+        read_telemetry(tmp_path / "a.json")
+
+
 def test_lists_inside_of_one_json_record_are_a_table(tmp_path):
     frame = FRAME.astype({"time": str})
     wide = {"id": 7, "hourly": {"unit": "V", **frame.to_dict("list")}}

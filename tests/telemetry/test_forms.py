@@ -298,6 +298,27 @@ READ = {
         ),
         START,
     ),
+    "a time of day and microseconds": (
+        table("date,clock,usec,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), [70_000] * N, VALUES),
+        START + pd.Timedelta("70ms"),
+    ),
+    "whole seconds and nanoseconds": (
+        table("time,ns,v", stamps("%Y-%m-%d %H:%M:%S"), [7 * 10**7] * N, VALUES),
+        START + pd.Timedelta("70ms"),
+    ),
+    "the day of a test beside its clock": (
+        table("test_date,time_s,v", ["2024-03-01"] * N, SECONDS, VALUES),
+        ZERO,
+    ),
+    "ISO 8601 durations": (table("time,v", [f"PT{60 * k}S" for k in range(N)], VALUES), ZERO),
+    "elapsed times that pass a day late": (
+        table("time,v", [f"{k // 60}:{k % 60:02d}:00" for k in range(1_410, 1_410 + N)], VALUES),
+        ZERO + pd.Timedelta("23.5h"),
+    ),
+    "LabVIEW's clock for each channel": (
+        table("X_Value,v,X_Value,Comment", SECONDS, VALUES, SECONDS),
+        ZERO,
+    ),
     "units behind all numbers": (table("time,v", UTC, [f"{value} °C" for value in VALUES]), START),
     "NaN of C": (table("time,v", UTC, VALUES).replace(f",{VALUES[30]}\n", ",-nan(ind)\n"), START),
 }
@@ -516,6 +537,35 @@ REFUSED = {
     "points and commas": (
         table("time;v;w", MINUTES, commas(VALUES), VALUES, separator=";"),
         "a point in 'w'",
+    ),
+    "a short line below the names": (
+        table("time,v,w", SECONDS, VALUES, VALUES).replace(f",{VALUES[0]}\n", "\n", 1),
+        "line 2 has 2",
+    ),
+    "names in another order further down": (
+        table("time,v,w", SECONDS, VALUES, VALUES, below="time,w,v\n3600,1,2\n"),
+        "time, w, v at line 62",
+    ),
+    "a multiple of a unit": (table("Time [10ms],v", 6_000 * np.arange(N), VALUES), "unit '10ms'"),
+    "a date and hours and minutes in one number": (
+        table(
+            "date,time,v", stamps("%Y-%m-%d"), (TIMES + pd.Timedelta("9h")).strftime("%H%M"), VALUES
+        ),
+        "one column, as 2024",
+    ),
+    "a clock behind each signal": (
+        table("v,v_time,w,w_time", VALUES, SECONDS, VALUES, 2 * SECONDS),
+        "--time w_time --column w",
+    ),
+    "steps of 100 ns since 1601": (
+        table("time,v", 133_537_536 * 10**9 + 10**7 * SECONDS, VALUES),
+        "from 1601 or 1904",
+    ),
+    "times since 1970 and no names": (
+        table("", 1_709_287_200 + SECONDS, VALUES).removeprefix("\n"),
+        "--no-header",
+        {"options": Cleaning(no_header=True), "time": "column 0"},
+        60.0,
     ),
     "a longer line": (
         table("time,v", MINUTES, VALUES).replace(f",{VALUES[5]}\n", ",1,2,3\n", 1),

@@ -51,8 +51,9 @@ _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 226
 DURATION = (
     r"[+-]?\d+(?:\.\d+)? ?"
     r"(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
+    r"|P(?:\d+D)?T\d[\d.HMS]*[HMS]|P\d+D"
 )
-"""Pattern of a time span as text, such as `0.5 sec` and `1 days 00:00:01`."""
+"""Pattern of a time span as text, such as `0.5 sec`, `1 days 00:00:01` and `PT90S`."""
 _ISO = "ISO8601"
 _COMPACT = {7: "%Y%j", 8: "%Y%m%d", 10: "%Y%m%d%H", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 _MIDNIGHT = r"(?<=[T ])24(?=:00)"  # at the end of a day
@@ -61,6 +62,7 @@ _MAX_JUMPS = 100  # above which times are in no order
 TIME_OF_DAY = (
     r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>[.,]\d+)?)?)(?P<half> ?[AaPp][Mm])?"
 )
+_ELAPSED = r"(?:2[4-9]|[3-9]\d|\d{3,}):\d\d:\d\d(?:\.\d+)?"  # more than a day
 _END = rf"(?:(?P<gap>[T:]|,? +){TIME_OF_DAY})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
 _DAY_OF_YEAR = re.compile(rf"\d{{4}}(?P<mark>[-/:. ]?)\d{{3}}{_END}")
 _DAY_MONTH = re.compile(
@@ -231,7 +233,7 @@ class _Reader:
                 # integer nanoseconds keep their precision
                 exact = pd.to_numeric(cells.where(~missing), errors="coerce")
                 found = exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values)
-            elif head.astype(str).str.strip().str.fullmatch(DURATION).all():
+            elif are_spans(text.dropna().str.strip()):
                 spans = pd.to_timedelta(text, errors="coerce")
                 found = spans.dt.total_seconds()
                 bad = spans.isna().to_numpy() & ~missing
@@ -309,12 +311,7 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
     found: dict[str, Sequence[str]] = {}  # the formats that a meaning has
     if 1900 <= low and high < 2100:
         found["decimal years"] = ()
-    minutes = values // 100 % 100
-    if (
-        1e4 <= high < 24e4
-        and low // 100 < high // 100
-        and max((values % 100).max(), minutes.max()) < 60
-    ):
+    if 1e4 <= high and low // 100 < high // 100 and may_be_time_of_day(values):
         found["times of day"] = ()
     if is_whole and 0 < low < 1.2e9 and step >= 1_000 and step % 60 > 0:
         found["ms or us"] = ("ms", "us")
@@ -340,6 +337,14 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
         )
 
 
+def may_be_time_of_day(values: np.ndarray) -> bool:
+    """Whether numbers may be times of day such as 1430 and 120059."""
+    values = values[np.isfinite(values)]
+    minutes = values // 100 % 100
+    is_time = (values >= 0) & (values < 24e4) & (values % 100 < 60) & (minutes < 60)
+    return bool(is_time.all()) and bool(values.max(initial=0) >= 100)
+
+
 def compact_form(values: np.ndarray) -> str | None:
     """Returns the format of dates that are written as numbers, such as 20240301, or None."""
     if not len(values) or not (values % 1 == 0).all():
@@ -362,7 +367,12 @@ def _infer_unit(values: np.ndarray, what: str) -> str:
     raise InputError(
         f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in "
         f"{what}, which are not from 1980 to 2077 in any of these units.",
-        [{"time_format": form} for form in ("ms", "us", "ns", "s")],
+        [
+            {"time_format": form}
+            for form in ("ms", "us", "ns", "s")
+            if size * UNITS_NS[form] < _LARGEST_NS
+        ],
+        "the times as dates, if they count from 1601 or 1904",
     )
 
 
@@ -375,6 +385,16 @@ def epoch_unit(size: float) -> str | None:
     return next(
         (unit for unit in units if _YEARS_S[0] <= size * UNITS_NS[unit] / 1e9 <= _YEARS_S[1]), None
     )
+
+
+def are_spans(text: pd.Series) -> bool:
+    """Whether text without missing cells is time spans, or times of day of which some are beyond
+    24 h, as elapsed ones are.
+    """
+    head = text.iloc[:LOOK]
+    if not head.str.fullmatch(TIME_OF_DAY).mean() > 0.5:
+        return bool(head.str.fullmatch(DURATION).mean() > 0.5)
+    return bool(text.str.fullmatch(_ELAPSED).any())
 
 
 def date_forms(text: pd.Series) -> list[str]:

@@ -86,7 +86,7 @@ def read_table_channels(
         raise InputError(
             f"Expected channels of different names. Received: {', '.join(several[:8])} in {what}, "
             "numbered here.",
-            [{"columns": several}, *({"columns": [name]} for name in several[:4])],
+            [{"columns": list(layout.channels)}, *({"columns": [name]} for name in several[:4])],
         )
     keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]
     findings = list(table.findings)

@@ -4,21 +4,24 @@ Dates win, then durations, then numbers that increase and whose name speaks of t
 only look like a clock are never taken.
 """
 
+import itertools
 import re
 import zoneinfo
 from collections.abc import Collection, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError, option_text
-from enhsim_tf.telemetry.cleaning.numbers import is_text
+from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_text
 from enhsim_tf.telemetry.cleaning.options import UNITS_NS
 from enhsim_tf.telemetry.cleaning.times import (
+    LOOK,
     Times,
     compact_form,
     epoch_unit,
+    may_be_time_of_day,
     refuse_two_meanings,
 )
 
@@ -59,12 +62,17 @@ _PARTS = {
     "hour": "hour hr hh stunde",
     "minute": "minute min mn",
     "second": "second sec ss sekunde sod secondofday",
-    "ms": _UNITS["ms"],
-}
+} | {unit: _UNITS[unit] for unit in ("ms", "us", "ns")}
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
-_MOST = {"hour": 24, "minute": 59, "ms": 999}  # of a time of day
+_FRACTIONS = {"ms": 999, "us": 999_999, "ns": 999_999_999}  # of a second, at most
+_MOST = {"hour": 24, "minute": 59} | _FRACTIONS  # of a time of day
 _ADDED = {"doy": "D", "hour": "h", "minute": "min", "second": "s", "ms": "ms"}
+_ADDED |= {"us": "us", "ns": "ns"}
 _RATIOS = sorted({one / other for one in UNITS_NS.values() for other in UNITS_NS.values()})
+# a number before a unit, as in `Time [10ms]` and `ticks (1/100 s)`
+_FACTOR = re.compile(
+    rf"(?<![^\W\d_])(\d[\d./^*-]*)[ *]*(?:{'|'.join(_UNIT_OF)})(?![^\W\d_])", re.IGNORECASE
+)
 _ZONE = re.compile(r"\b(?:[A-Z][a-z]+/[A-Z]\w+|CES?T|MES?Z|BST|JST|[ECMP][SD]T)\b")
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
 _ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
@@ -92,7 +100,7 @@ def name_tells(name: str) -> tuple[int, str | None]:
     """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit
     or kind of days that it states.
     """
-    if name.casefold().strip() in ("x_value", "x-axis"):  # of LabVIEW and of oscilloscopes
+    if re.fullmatch(r"x_value(?:\.\d+)?|x-axis", name.casefold().strip()):  # of LabVIEW and scopes
         return 2, None
     words = words_of(name)
     unit = next((_UNIT_OF[word] for word in reversed(words) if word in _UNIT_OF), None)
@@ -141,13 +149,18 @@ def find_clock(
     """
     tells = {name: name_tells(name)[0] for name in kinds}
     of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "spans")}
-    dates = _without_ends(_varying(of_kind["dates"], frame))
+    varying = _varying(of_kind["dates"], frame)
+    dates = _without_ends(varying or of_kind["dates"][:1])
     spans = of_kind["spans"]
     named = [name for name in numbers if tells[name] == 2]
     compact = [name for name in named if compact_form(numbers[name]) == "%Y%m%d"]
     if (joined := _joined(frame, kinds, dates or compact, numbers)) is not None:
         return joined
-    if dates:
+    if dates and _are_days(frame[dates[0]]):
+        for name in named:
+            if name_tells(name)[1] is None and may_be_time_of_day(numbers[name]):
+                _refuse_apart(dates[0], name, frame, what)
+    if varying:
         return _one_of([name for name in dates if tells[name]] or dates, frame, what)
     if spans:
         return Clock((spans[0],), frame[spans[0]])
@@ -170,14 +183,9 @@ def find_clock(
     others = [name for name in others if not _shows_time(numbers[first], numbers[name])]
     clocks = _without_ends([first, *others]) if first else []
     if clocks and compact and clocks != compact[:1]:
-        raise InputError(
-            f"Expected a date and its time of day in one column. Received: {compact[0]!r} "
-            f"({numbers[compact[0]][0]:.0f}) and {clocks[0]!r} in {what}.",
-            [_COUNT],
-            "both in one column, as 2024-03-01T12:00:00",
-        )
-    if clocks:
-        return _one_of(clocks, frame, what)
+        _refuse_apart(compact[0], clocks[0], frame, what)
+    if clocks or dates:
+        return _one_of(clocks or dates, frame, what)
     for name, kind in kinds.items():
         if tells[name] == 2 and kind == "times of day":
             raise InputError(
@@ -196,6 +204,16 @@ def find_clock(
         )
     _refuse_unknown(frame, kinds, numbers, what)
     return Clock()
+
+
+def _refuse_apart(day: str, time: str, frame: pd.DataFrame, what: str) -> NoReturn:
+    cells = ", ".join(format_cell(frame[name].iloc[0]) for name in (day, time))
+    raise InputError(
+        f"Expected a date and its time of day in one column. Received: {day!r} and {time!r} "
+        f"({cells}) in {what}.",
+        [_COUNT],
+        "both in one column, as 2024-03-01T12:00:00",
+    )
 
 
 def _may_be_clock(tells: int, values: np.ndarray) -> bool:
@@ -236,7 +254,11 @@ def _refuse_unknown(
         raise InputError(
             f"Expected to know the clock. Received: {ramp!r} of {what}, which increases in steps "
             f"of {step:g}, as a clock or a counter does.",
-            [{"time": ramp}, {"time": ramp, "time_format": "ms"}, _COUNT],
+            [
+                {"time": ramp},
+                *([] if is_epoch(numbers[ramp]) else [{"time": ramp, "time_format": "ms"}]),
+                _COUNT,
+            ],
         )
     for name in (name for name, kind in kinds.items() if kind == "words"):
         cells = frame[name].dropna().astype("str").iloc[:1_000]
@@ -257,11 +279,19 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
     """Returns the unit or kind of days that the name of a clock's one column or the line of units
     states, or None.
 
-    Raises an `InputError` if the column holds days whose kind is not known.
+    Raises an `InputError` if the column holds days whose kind is not known, or multiples of a unit.
     """
     if len(clock.columns) != 1:
         return None
     name = clock.columns[0]
+    factor = _FACTOR.search(f"{name} {units.get(name, '')}")
+    if factor and factor[1] != "1" and pd.api.types.is_numeric_dtype(clock.cells.dtype):
+        raise InputError(
+            f"Expected times in s, ms, us or ns. Received: the unit {factor[0]!r} of {name!r} in "
+            f"{what}.",
+            [_COUNT],
+            "the times in one of these units, and with its name",
+        )
     form = name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
     if (
         form is None
@@ -317,9 +347,9 @@ def _fractions(numbers: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
     pairs = []
     for (*stem, unit), name in stems.items():
         seconds = stems.get((*stem, "s"))
-        if unit in ("ms", "us", "ns") and seconds is not None:
+        if unit in _FRACTIONS and seconds is not None:
             rest = numbers[name]
-            is_part = _are_whole(rest, 0, UNITS_NS["s"] / UNITS_NS[unit] - 1)
+            is_part = _are_whole(rest, 0, _FRACTIONS[unit])
             wraps = (np.diff(rest) < 0).any() or np.ptp(numbers[seconds]) == 0
             if is_part and (numbers[seconds] % 1 == 0).all() and wraps:
                 pairs.append((seconds, name))
@@ -337,8 +367,8 @@ def refuse_own_clocks(
     asked: Collection[str],
     what: str,
 ) -> None:
-    """Refuses signals that each have a clock of their own in front of them, unless those of one
-    clock are asked for.
+    """Refuses signals that each have a clock of their own beside them, unless those of one clock
+    are asked for.
     """
     clocks = {
         name
@@ -346,6 +376,14 @@ def refuse_own_clocks(
         if kinds[name] == "dates" or name in numbers and _is_named_clock(name, numbers[name])
     }
     groups = _signals_of(kinds, clocks)
+    behind = {
+        name
+        for before, name in itertools.pairwise(kinds)
+        if _tells_time_of(before, name)
+        and (kinds[name] == "dates" or name in numbers and _is_increasing(numbers[name]))
+    }
+    if not groups and clocks <= behind:
+        groups = _signals_of(dict(reversed(kinds.items())), behind)
     if not groups:
         return
     first, *others = groups
@@ -378,6 +416,14 @@ def _signals_of(kinds: Mapping[str, str], clocks: Collection[str]) -> dict[str, 
             groups[list(groups)[-1]].append(name)
     is_whole = len(groups) > 1 and all(groups.values()) and next(iter(kinds)) in groups
     return groups if is_whole else {}
+
+
+def _tells_time_of(signal: str, name: str) -> bool:
+    """Whether a name says no more than that of a signal and that it is a time, as `volts_time`
+    beside `volts` and `time2` beside any.
+    """
+    own = [word for word in words_of(name) if word not in words_of(signal)]
+    return len(own) == 1 and own[0] in _TIMES.union("t")
 
 
 def _is_named_clock(name: str, values: np.ndarray) -> bool:
@@ -452,15 +498,12 @@ def _shows_time(times: np.ndarray, values: np.ndarray) -> bool:
 
 
 def _varying(names: list[str], frame: pd.DataFrame) -> list[str]:
-    """Leaves out columns that hold the same date throughout, such as the range of a query, unless
-    no other is left.
-    """
-    varying = [
+    """Leaves out columns that hold the same date throughout, such as the range of a query."""
+    return [
         name
         for name in names
         if frame[name].iloc[:1_000].nunique() > 1 or frame[name].nunique() > 1
     ]
-    return varying or names[:1]
 
 
 def _joined(
@@ -481,16 +524,17 @@ def _joined(
         cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
     has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # who keeps a zone keeps times
     local = cells.dt.tz_convert(None) if has_zone else cells  # far dates have no text with a zone
-    head = local.dropna().iloc[:200].astype("str")
-    is_day = not has_zone and not head.str.contains(r":|T\d|\d{8}\d").any()
+    head = local.dropna().iloc[:LOOK].astype("str")
+    is_day = not has_zone and _are_days(head)
     whole_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
     parts = {
         part: name
         for part, name in _parts_of(numbers).items()
         if _are_whole(numbers[name], 0, _MOST.get(part, -1))
     }
-    if hours and is_day or not is_day and "ms" in parts and whole_seconds:
-        parts = {part: name for part, name in parts.items() if part == "ms"}
+    fractions = {part: name for part, name in parts.items() if part in _FRACTIONS}
+    if hours and is_day or not is_day and fractions and whole_seconds:
+        parts = fractions
     elif not is_day or "hour" not in parts:
         parts = {}
     texts: list[str] = []
@@ -508,6 +552,12 @@ def _joined(
             cells = cells + " " + frame[name].astype("str").str.strip()
     columns = (dates[0], *texts, *parts.values())
     return Clock(columns, cells, _added(numbers, parts)) if len(columns) > 1 else None
+
+
+def _are_days(cells: pd.Series) -> bool:
+    """Whether dates have no time of day."""
+    head = cells.dropna().iloc[:LOOK].astype("str")
+    return not head.str.contains(r":|T\d|\d{8}\d").any()
 
 
 def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
@@ -530,7 +580,7 @@ def _added(numbers: Mapping[str, np.ndarray], parts: Mapping[str, str]) -> pd.Se
         for part, unit in _ADDED.items()
         if part in parts
     ]
-    return sum(spans[1:], spans[0]).dt.round("ms") if spans else None
+    return sum(spans[1:], spans[0]).dt.round("us") if spans else None
 
 
 def _date_parts(numbers: Mapping[str, np.ndarray]) -> Clock | None:
@@ -543,6 +593,8 @@ def _date_parts(numbers: Mapping[str, np.ndarray]) -> Clock | None:
     years = numbers[parts["year"]]
     if not _are_whole(years[np.isfinite(years)], 1900, 2200):
         return None
+    if "second" not in parts:
+        parts = {part: name for part, name in parts.items() if part not in _FRACTIONS}
     of_date = ("month", "day") if "doy" not in parts else ()
     days = {part: numbers[parts[part]] if part in parts else 1.0 for part in of_date}
     days = pd.DataFrame({"year": years, "month": 1.0, "day": 1.0} | days)

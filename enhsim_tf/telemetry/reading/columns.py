@@ -20,10 +20,10 @@ from enhsim_tf.telemetry.cleaning.numbers import (
 )
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import (
-    DURATION,
     LOOK,
     TIME_OF_DAY,
     Times,
+    are_spans,
     date_forms,
     parse_times,
 )
@@ -32,6 +32,7 @@ from enhsim_tf.telemetry.reading.clock import (
     Clock,
     find_clock,
     further_clocks,
+    is_epoch,
     offset_of,
     refuse_own_clocks,
     unit_of,
@@ -180,6 +181,7 @@ def lay_out(
             clock.columns
             and _counts(values)
             or _UNNAMED(name)
+            and not is_epoch(values)
             and len(np.unique(values)) == len(values)
             and not (values % 1).any()
         )
@@ -237,9 +239,14 @@ def _kind_of(cells: pd.Series) -> str:
         return "objects"
     if has_commas(text):  # which are refused where they can be read in two ways
         return "numbers"
-    for kind, pattern in (("spans", DURATION), ("times of day", TIME_OF_DAY)):
-        if text.str.fullmatch(pattern).mean() > 0.5:
-            return kind
+    if text.str.fullmatch(TIME_OF_DAY).mean() > 0.5:  # elapsed ones may pass 24 h late
+        return (
+            "spans"
+            if are_spans(cells[~is_missing(cells)].astype("str").str.strip())
+            else "times of day"
+        )
+    if are_spans(text):
+        return "spans"
     return (
         "dates"
         if date_forms(text)
@@ -296,7 +303,7 @@ def _labels_of(
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
     """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
     words = set(words_of(name))
-    if not (_UNNAMED(name) or words and words <= _ROWS):
+    if not (_UNNAMED(name) or words and words <= _ROWS) or is_epoch(values):
         return False
     return len(values) == 1 or bool(len(values)) and bool(np.mean(np.diff(values) == 1) >= 0.9)
 

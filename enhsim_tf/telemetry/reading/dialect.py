@@ -194,6 +194,12 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
         begin = rows.index(filled[0]) + (not no_header)
     while begin > 0 and len(rows[begin - 1]) == width and share(rows[begin - 1]) > 0:
         begin -= 1
+    # rows below the names with too few or too many cells, which are refused as such
+    above = begin
+    while above > 0 and len(rows[above - 1]) != width and share(rows[above - 1]) > 0.5:
+        above -= 1
+    if 0 < above < begin and len(rows[above - 1]) == width and share(rows[above - 1]) == 0:
+        begin = above
     # of a last column that is mostly left out
     lacks = begin > 0 and len(rows[begin - 1]) == width + 1 and share(rows[begin - 1]) == 0
     width += lacks

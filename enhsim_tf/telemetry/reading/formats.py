@@ -35,6 +35,9 @@ _FOREIGN = {
         "the lines with a comma instead of ' -> ', only numbers behind it and names on top",
     ),
 }
+# attributes of the conventions for climate and forecast by which values are to be converted
+_PACKED = {"scale_factor", "add_offset"}
+_SINCE_1970 = re.compile("(?:s|sec|seconds) since 1970-01-01").match
 _FEWEST_ROWS = 3  # with numbers, below which a sheet is no telemetry
 
 
@@ -51,8 +54,15 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
     with reading(name):
         text = content.decode("utf-8-sig").strip()
         is_whole = text.startswith(("[", "{\n", "{\r"))
-        lines = [text] if is_whole else text.splitlines()
-        records = [json.loads(line) for line in lines if line.strip()]
+        lines = [text] if is_whole else [line for line in text.splitlines() if line.strip()]
+        records = [json.loads(line) for line in lines[:-1]]
+        findings = []
+        try:
+            records += [json.loads(line) for line in lines[-1:]]
+        except json.JSONDecodeError:
+            if not records or content.endswith(b"\n"):
+                raise
+            findings = [Finding("ragged lines", 1, "the last line is cut off and left out")]
     if len(records) == 1 and isinstance(records[0], dict):
         with reading(name):
             lists = _lists_of(records[0])
@@ -70,7 +80,19 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
             f"records, {name}. Leave it out."
         )
     with reading(name):
-        return Table(pd.json_normalize(records[0] if is_whole else records))
+        frame = _frame_of(records[0] if is_whole else records)
+    return Table(frame, findings=tuple(findings))
+
+
+def _frame_of(records: Sequence[Any]) -> pd.DataFrame:
+    """Makes a table of records, or of lists of one length, of which the first may hold names."""
+    if not records or not all(isinstance(record, list) for record in records):
+        return pd.json_normalize(records)
+    if len(lengths := {len(record) for record in records}) > 1:
+        raise ValueError(f"lists of {min(lengths)} to {max(lengths)} values")
+    if all(isinstance(cell, str) for cell in records[0]):
+        return pd.DataFrame(records[1:], columns=records[0])
+    return pd.DataFrame(records).rename(columns="column {}".format)
 
 
 def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str], np.ndarray]:
@@ -85,7 +107,7 @@ def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str
         elif isinstance(value, list) and value:
             is_records = isinstance(value[0], dict)
             frame = pd.json_normalize(value) if is_records else pd.DataFrame(value)
-            cells = frame.loc[:, frame.dtypes == object]
+            cells = frame[[column for column in frame if frame[column].dtype == object]]
             if cells.map(lambda cell: isinstance(cell, list | dict)).any(axis=None):
                 continue
             for name, column in frame.items():
@@ -152,10 +174,27 @@ def read_matlab(content: bytes, name: str, options: Cleaning) -> Table:
     arrays = {}
     for key, value in variables.items():
         if isinstance(value, dict):
-            arrays |= {(key, field): np.asarray(inside) for field, inside in value.items()}
+            arrays |= {(key, field): inside for field, inside in _fields_of(value).items()}
         elif not key.startswith("__"):
             arrays["", key] = np.asarray(value)
     return _of_arrays(arrays, name, options)
+
+
+def _fields_of(struct: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Returns the arrays of a struct and of the structs in it, such as the signals of Simulink's
+    structure with time, by their names.
+    """
+    fields: dict[str, np.ndarray] = {}
+    for key, value in struct.items():
+        several = isinstance(value, np.ndarray | list) and all(isinstance(x, dict) for x in value)
+        if isinstance(value, dict):
+            fields |= {f"{key}.{name}": inside for name, inside in _fields_of(value).items()}
+        elif several:
+            numbered = {f"{key}.{number}": inside for number, inside in enumerate(value, 1)}
+            fields |= _fields_of(numbered)
+        else:
+            fields[key] = np.asarray(value)
+    return fields
 
 
 def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
@@ -163,11 +202,22 @@ def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
     import h5py
 
     arrays: dict[tuple[str, str], np.ndarray] = {}
+    units: dict[str, str] = {}
 
     def add(path: str, item: Any) -> None:
         if not isinstance(item, h5py.Dataset) or item.attrs.get("MATLAB_class") == b"char":
             return
         parent, _, key = path.rpartition("/")
+        unit = item.attrs.get("units", "")
+        units[path] = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
+        packed = _PACKED.intersection(item.attrs)
+        if packed or " since " in units[path] and not _SINCE_1970(units[path]):
+            stated = f"the units {units[path]!r}" if not packed else min(packed)
+            raise InputError(
+                f"Expected values as they are. Received: {stated} of {path!r} in {name}.",
+                (),
+                "what xarray.open_dataset(file).to_dataframe() returns",
+            )
         values = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
         if values.dtype.names:
             arrays.update({(path, field): values[field] for field in values.dtype.names})
@@ -176,11 +226,18 @@ def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
 
     with reading(name), h5py.File(io.BytesIO(content)) as file:
         file.visititems(add)
-    return _of_arrays(arrays, name, options)
+    return _of_arrays(arrays, name, options, units)
 
 
-def _of_arrays(arrays: Mapping[tuple[str, str], np.ndarray], name: str, options: Cleaning) -> Table:
-    """Makes a table of the arrays of one group that have one length, by their group and name."""
+def _of_arrays(
+    arrays: Mapping[tuple[str, str], np.ndarray],
+    name: str,
+    options: Cleaning,
+    units: Mapping[str, str] | None = None,
+) -> Table:
+    """Makes a table of the arrays of one group that have one length, by their group and name;
+    `units` are by both with a slash between them.
+    """
     tables: dict[tuple[str, int], dict[str, Any]] = {}
     for (group, key), values in arrays.items():
         values = np.squeeze(values)
@@ -204,8 +261,11 @@ def _of_arrays(arrays: Mapping[tuple[str, str], np.ndarray], name: str, options:
         group if group and lengths.count(group) == 1 else next(iter(columns)): columns
         for (group, _), columns in tables.items()
     }
-    chosen = named[chosen_table(named, name, options)]
-    return Table(pd.DataFrame({key: pd.Series(values) for key, values in chosen.items()}))
+    title = chosen_table(named, name, options)
+    frame = pd.DataFrame({key: pd.Series(values) for key, values in named[title].items()})
+    group = next(group for (group, _), columns in tables.items() if columns is named[title])
+    stated = {key: (units or {}).get(f"{group}/{key}".strip("/"), "") for key in frame}
+    return Table(frame, units=stated)
 
 
 def refuse_channels_first(values: np.ndarray, what: str) -> None:
@@ -254,6 +314,7 @@ CONVERT = {
     ".tdms": "npTDMS",
     ".ulg": "pyulog",
     ".bag": "rosbags",
+    ".nc": "xarray",
     ".xls": "a spreadsheet program, as .xlsx",
     ".npz": "numpy.load, as .npy",
 }

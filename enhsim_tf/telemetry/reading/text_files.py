@@ -117,7 +117,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 "the decimal sign of the file is a comma; points separate thousands",
             )
         )
-    repeated = _repeated_headers(frame, dialect.names)
+    repeated = _repeated_headers(frame, dialect.names, name, above)
     if repeated:
         frame = frame.astype(object)
         frame.iloc[repeated] = None
@@ -291,25 +291,31 @@ def _parse(data: bytes, dialect: Dialect, decimal: str | None) -> pd.DataFrame:
     return frame
 
 
-def _repeated_headers(frame: pd.DataFrame, names: Sequence[str]) -> list[int]:
+def _repeated_headers(
+    frame: pd.DataFrame, names: Sequence[str], name: str, above: int
+) -> list[int]:
     """Returns the numbers of the rows that repeat the names, as in files that were joined, or that
-    WinCC writes where it stops (`$RT_OFF$`).
+    WinCC writes where it stops (`$RT_OFF$`); refuses a header with others or in another order.
     """
-    place = next((number for number, name in enumerate(names) if name[:7] != "column "), 0)
+    place = next((number for number, each in enumerate(names) if each[:7] != "column "), 0)
     first = frame.iloc[:, place]
     if not is_text(first):
         return []
     first = first.astype("str")
-    rows = np.flatnonzero((first.str.startswith("$RT_") | (first == names[place])).fillna(False))
-    return [
-        row
-        for row in rows
-        if first.iloc[row] != names[place]
-        or all(
-            str(cell).strip() in (name, "nan")
-            for cell, name in zip(frame.iloc[row], names, strict=True)
-        )
-    ]
+    found = np.flatnonzero((first.str.startswith("$RT_") | first.isin(names)).fillna(False))
+    rows = []
+    for row in found.tolist():
+        cells = [str(cell).strip() for cell in frame.iloc[row]]
+        is_same = all(cell in (each, "nan") for cell, each in zip(cells, names, strict=True))
+        if is_same or first.iloc[row].startswith("$RT_"):
+            rows.append(row)
+        elif 2 * sum(cell in names for cell in cells) > len(cells):
+            raise InputError(
+                f"Expected one order of columns. Received: {', '.join(cells)[:60]} at line "
+                f"{row + above + 1} of {name}, below {', '.join(names)[:60]}.",
+                otherwise="the parts one by one",
+            )
+    return rows
 
 
 def _read_annotated(text: str, name: str, findings: list[Finding]) -> Table:
