@@ -610,6 +610,17 @@ def test_a_form_with_two_meanings_is_refused_and_read_as_the_message_says(tmp_pa
         np.testing.assert_allclose(cleaned.longest.values[:, 0], VALUES, atol=1e-5)
 
 
+def test_numbers_that_turn_hexadecimal_further_down_are_words(tmp_path, refused):
+    cells = [f"{number:02X}" for number in [*range(16, 26)] * 30 + [*range(160, 256)]]
+    (tmp_path / "a.csv").write_text(table("time,code,v", range(396), cells, range(396)))
+    assert list(read_source(tmp_path / "a.csv")) == ["v"]
+    (tmp_path / "a.csv").write_text(
+        table("time,code,v", range(301), [*cells[:300], "BD"], range(301))
+    )
+    with refused("'BD' at line 302"):
+        clean(read_source(tmp_path / "a.csv")["code"])
+
+
 def test_a_column_without_a_name_that_does_not_count_by_one_may_be_the_clock(tmp_path, refused):
     (tmp_path / "a.csv").write_text(table("", 250 * np.arange(N), VALUES).removeprefix("\n"))
     with refused("--time 'column 0' --time-format ms"):

@@ -231,7 +231,7 @@ def _kind_of(cells: pd.Series) -> str:
         .astype("str")
         .str.strip()
     )
-    if len(text) == len(given) and _are_hex(text):
+    if len(text) == len(given) and (_are_hex(text) or _turn_hex(text, cells)):
         return "words"
     if not parse_numbers(given, "", drop=True, units=False)[1].all():
         return "numbers"
@@ -264,6 +264,16 @@ def _are_hex(text: pd.Series) -> bool:
         and bool(text.str.contains("[A-Fa-f]").any())
         and not text.str.fullmatch(r"\d+[eE]\d+|\d+").all()
     )
+
+
+def _turn_hex(head: pd.Series, cells: pd.Series) -> bool:
+    """Whether numbers of one length are hexadecimal further down, as `9A` behind `10`."""
+    if head.str.len().nunique() > 1 or not head.str.fullmatch(r"\d{2,}").all():
+        return False
+    text = cells.dropna().astype("str").str.strip()
+    mixed = text[text.str.fullmatch(r"(?=.*\d)[\dA-Fa-f]*[A-Fa-f][\dA-Fa-f]*")]
+    of_length = mixed[mixed.str.len() == len(head.iloc[0])]
+    return not of_length.str.fullmatch(r"\d+[eE]\d+").all()
 
 
 def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
