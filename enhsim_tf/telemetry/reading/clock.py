@@ -522,10 +522,9 @@ def _joined(
     if dates[0] in numbers:
         text = numbers[dates[0]].astype(np.int64).astype(str)
         cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
-    has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # who keeps a zone keeps times
-    local = cells.dt.tz_convert(None) if has_zone else cells  # far dates have no text with a zone
-    head = local.dropna().iloc[:LOOK].astype("str")
-    is_day = not has_zone and _are_days(head)
+    is_day = _are_days(cells)
+    has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # far dates have no text with one
+    head = (cells.dt.tz_convert(None) if has_zone else cells).dropna().iloc[:LOOK].astype("str")
     whole_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
     parts = {
         part: name
@@ -555,7 +554,9 @@ def _joined(
 
 
 def _are_days(cells: pd.Series) -> bool:
-    """Whether dates have no time of day."""
+    """Whether dates have no time of day; who keeps a zone keeps times."""
+    if isinstance(cells.dtype, pd.DatetimeTZDtype):  # far ones have no text
+        return False
     head = cells.dropna().iloc[:LOOK].astype("str")
     return not head.str.contains(r":|T\d|\d{8}\d").any()
 
