@@ -131,6 +131,12 @@ def find_interval(times: np.ndarray) -> float:
     )
     most = steps[np.argmax(near)]
     interval = float(np.median(steps[(_ALIKE[0] * most <= steps) & (steps <= _ALIKE[1] * most)]))
+    if regular_step_fraction(times, interval) < 0.9 and steps[-1] < 2 * steps[0]:
+        # times that were cut, as 0, 2, 5, 7 of 0, 2.5, 5, 7.5, are never an interval off
+        places = np.arange(len(times))
+        usual = _slope(places, times - times[0])
+        if np.ptp(times - times[0] - usual * places) < usual:
+            return usual
     return _refined(times, interval)
 
 
@@ -152,6 +158,11 @@ def _refined(times: np.ndarray, interval: float) -> float:
     step = float(common[np.argmax(counts)])
     if counts.max() >= 0.9 * (last - first) and np.ptp(since - places * step) <= 0.5 * step:
         return step
+    return _slope(places, since)
+
+
+def _slope(places: np.ndarray, since: np.ndarray) -> float:
+    """Returns the slope of a fitted line, rounded where that moves no time by a twentieth of it."""
     centred = places - places.mean()
     slope = float(centred @ since / (centred @ centred))
     plain = (float(f"{slope:.{digits}e}") for digits in range(15))  # fewest digits that fit as well
@@ -232,7 +243,7 @@ def _drop_duplicate_times(
     if (
         options.same_time == "mean"
         and options.interval_s is None
-        and 2 * len(left) >= len(rows) > 2
+        and 4 * len(left) >= len(rows) > 3
     ):
         raise InputError(
             f"Expected a time for each row. Received: {len(rows):,} rows of {name} with "

@@ -55,7 +55,8 @@ class Places:
         if not before:
             return f"row {row}"
         first, line, name = before[-1]
-        return f"line {row - first + line}" + (f" of {name}" if len(self.files) > 1 else "")
+        is_one = len({name for _, _, name in self.files}) == 1
+        return f"line {row - first + line}" + ("" if is_one else f" of {name}")
 
 
 ROWS = Places()

@@ -62,13 +62,15 @@ _MAX_JUMPS = 100  # above which times are in no order
 TIME_OF_DAY = (
     r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>[.,]\d+)?)?)(?P<half> ?[AaPp][Mm])?"
 )
-_ELAPSED = r"(?:2[4-9]|[3-9]\d|\d{3,}):\d\d:\d\d(?:\.\d+)?"  # more than a day
+# more than a day; 24:00:00 may be its end
+_ELAPSED = r"(?:24(?!:00:00)|2[5-9]|[3-9]\d|\d{3,}):\d\d:\d\d(?:\.\d+)?"
 _END = rf"(?:(?P<gap>[T:]|,? +){TIME_OF_DAY})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
 _DAY_OF_YEAR = re.compile(rf"\d{{4}}(?P<mark>[-/:. ]?)\d{{3}}{_END}")
 _DAY_MONTH = re.compile(
     r"\d\d?(?P<mark>[./-])(?:\d\d?|(?P<letters>[A-Za-z]{3}))"
     rf"(?P=mark)\d\d(?P<century>\d\d)?{_END}"
 )
+_YEAR_FIRST = re.compile(rf"\d{{4}}(?P<mark>[./-])\d\d?(?P=mark)\d\d?{_END}")
 _GUESSED = re.compile(r"[A-Za-z]{3}|^\d{4}[/.]")
 
 
@@ -311,7 +313,8 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
     found: dict[str, Sequence[str]] = {}  # the formats that a meaning has
     if 1900 <= low and high < 2100:
         found["decimal years"] = ()
-    if 1e4 <= high and low // 100 < high // 100 and may_be_time_of_day(values):
+    has_hours = 1e4 <= high or np.ptp(np.diff(values)) > 0  # 50 after 0, and 100 after 50, are none
+    if has_hours and low // 100 < high // 100 and may_be_time_of_day(values):
         found["times of day"] = ()
     if is_whole and 0 < low < 1.2e9 and step >= 1_000 and step % 60 > 0:
         found["ms or us"] = ("ms", "us")
@@ -416,6 +419,8 @@ def date_forms(text: pd.Series) -> list[str]:
             year = "%Y" if found["century"] else "%y"
             orders = [f"%d{mark}%b{mark}{year}"] if found["letters"] else _orders(text, mark, year)
             return [form + _end(found) for form in orders]
+        if (found := _YEAR_FIRST.fullmatch(cell)) and found["half"]:
+            return [f"%Y{found['mark']}%m{found['mark']}%d{_end(found)}"]
         form = guess_datetime_format(cell) if _GUESSED.search(cell) else None
         if form and "%Y" in form and "%d" in form:
             return [form]
@@ -596,10 +601,14 @@ def jumps_back(times: np.ndarray) -> list[int]:
     if not 1 <= len(jumps) <= _MAX_JUMPS:
         return []
     again = []
+    longest = 3 * np.median(np.abs(steps))
     for jump, end in itertools.pairwise([*jumps, len(times) - 1]):
         run = times[jump + 1 : end + 1]
-        before = times[: jump + 1]
-        num_twice = ((before >= run.min()) & (before <= run.max())).sum()
+        before = np.sort(times[: jump + 1])
+        place = np.searchsorted(before, run, "right")
+        inside = (place > 0) & (place < len(before))
+        # a gap that is filled late was not shown before
+        num_twice = (before[place[inside]] - before[place[inside] - 1] <= longest).sum()
         if num_twice > 10 and len(run) > 10 and (np.diff(run) >= 0).mean() > 0.9:
             again.append(int(jump))
     return again if 2 * len(again) >= len(jumps) else []

@@ -130,7 +130,7 @@ def read_table_channels(
         pairs = "only numbers below a line of names, with commas between them"
         raise InputError(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
-            [{"states": True}] if has_states else (),
+            [{"states": True}] if has_states and not options.states else (),
             pairs if _PAIR.search(left) else "another table",
         )
     channels = {
@@ -365,6 +365,7 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
             pd.api.types.is_integer_dtype(cells.dtype)
             and layout.channels != (name,)
             and 1 < cells.nunique() <= _MAX_SERIES
+            and not cells.is_monotonic_increasing
             and _repeating(frame, [name], times) < 0.02
             and not 0 < len(jumps) < np.count_nonzero(np.diff(cells))
         ):

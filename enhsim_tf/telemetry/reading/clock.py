@@ -22,6 +22,7 @@ from enhsim_tf.telemetry.cleaning.times import (
     compact_form,
     epoch_unit,
     may_be_time_of_day,
+    parse_times,
     refuse_two_meanings,
 )
 
@@ -47,7 +48,7 @@ _UNITS = {
     "h": "h hr hrs hour hours stunden",
     "min": "min mins minute minutes minuten",
     "s": "s sec secs second seconds sekunden",
-    "ms": "ms msec msecs millis millisecond milliseconds",
+    "ms": "ms msec msecs millis millitm millisecond milliseconds",
     "us": "us \u00b5s \u03bcs usec usecs micros microsecond microseconds",
     "ns": "ns nsec nsecs nanos nanosecond nanoseconds",
 }
@@ -65,15 +66,22 @@ _PARTS = {
 } | {unit: _UNITS[unit] for unit in ("ms", "us", "ns")}
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
 _FRACTIONS = {"ms": 999, "us": 999_999, "ns": 999_999_999}  # of a second, at most
-_MOST = {"hour": 24, "minute": 59} | _FRACTIONS  # of a time of day
+_MOST = {"hour": 24, "minute": 59, "second": 60} | _FRACTIONS  # of a time of day
+_STATISTICS = set("max maximum mean avg average".split())  # beside which `min` is no minute
+_CLOSE = 0.02  # by which fractions of a second may make the steps of a clock less alike
+_OFTEN = 0.3  # share of the rows that repeat a date, above which it lacks its time of day
 _ADDED = {"doy": "D", "hour": "h", "minute": "min", "second": "s", "ms": "ms"}
 _ADDED |= {"us": "us", "ns": "ns"}
 _RATIOS = sorted({one / other for one in UNITS_NS.values() for other in UNITS_NS.values()})
 # a number before a unit, as in `Time [10ms]` and `ticks (1/100 s)`
 _FACTOR = re.compile(
-    rf"(?<![^\W\d_])(\d[\d./^*-]*)[ *]*(?:{'|'.join(_UNIT_OF)})(?![^\W\d_])", re.IGNORECASE
+    rf"(?:[\[(]\s*x?|(?<!\d)/\s*|_)(\d[\d./^*-]*)[ *]*(?:{'|'.join(_UNIT_OF)})(?![^\W\d_])",
+    re.IGNORECASE,
 )
-_ZONE = re.compile(r"\b(?:[A-Z][a-z]+/[A-Z]\w+|CES?T|MES?Z|BST|JST|[ECMP][SD]T)\b")
+_ZONE = re.compile(
+    r"\b(?:[A-Z][a-z]+/[A-Z]\w+|CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b"
+)
+_TIME_LIKE = r"\s*\d\d? ?[:.hH-] ?\d\d\b.*"
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
 _ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
 
@@ -114,6 +122,11 @@ def name_tells(name: str) -> tuple[int, str | None]:
     return (2, unit) if is_known and any(word in _TIMES for word in words) else (0, None)
 
 
+def _seconds_of(spans: pd.Series) -> np.ndarray:
+    stamps = parse_times(spans, "", drop=True).stamps
+    return np.where(stamps.isna(), np.nan, stamps.as_unit("ns").asi8 / 1e9)
+
+
 def _is_increasing(values: np.ndarray) -> bool:
     """Whether numbers increase nearly throughout; some may repeat, and a few may come late."""
     steps = np.diff(values[np.isfinite(values)])
@@ -151,24 +164,28 @@ def find_clock(
     of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "spans")}
     varying = _varying(of_kind["dates"], frame)
     dates = _without_ends(varying or of_kind["dates"][:1])
-    spans = of_kind["spans"]
+    spans = [name for name in of_kind["spans"] if _is_increasing(_seconds_of(frame[name]))]
+    spans.sort(key=lambda name: -tells[name])
     named = [name for name in numbers if tells[name] == 2]
     compact = [name for name in named if compact_form(numbers[name]) == "%Y%m%d"]
     if (joined := _joined(frame, kinds, dates or compact, numbers)) is not None:
         return joined
-    if dates and _are_days(frame[dates[0]]):
-        for name in named:
-            if name_tells(name)[1] is None and may_be_time_of_day(numbers[name]):
-                _refuse_apart(dates[0], name, frame, what)
+    dates = [name for name in dates if tells[name]] or dates
+    if dates and frame[dates[0]].duplicated().mean() > _OFTEN:
+        _refuse_apart_times(dates[0], kinds, frame, numbers, what)
     if varying:
-        return _one_of([name for name in dates if tells[name]] or dates, frame, what)
-    if spans:
-        return Clock((spans[0],), frame[spans[0]])
+        return _one_of(dates, frame, what)
     if (parts := _date_parts(numbers)) is not None:
+        hours = [name for name in kinds if kinds[name] == "times of day"]
+        if len(hours) == 1 and parts.added is None:
+            days = parts.cells.dt.strftime("%Y-%m-%d ")
+            return Clock((*parts.columns, hours[0]), days + frame[hours[0]].astype("str"))
         return parts
     fractions = _fractions(numbers)
     whole = {name: values for name, values in numbers.items() if name not in sum(fractions, ())}
     may_be = {name for name in whole if _may_be_clock(tells[name], whole[name])}
+    if spans and not fractions and all(tells[name] < 2 for name in may_be):
+        return Clock((spans[0],), frame[spans[0]])
     if fractions and not may_be:
         (seconds, rest), *_ = fractions
         unit = _UNIT_OF[words_of(rest)[-1]]
@@ -187,7 +204,7 @@ def find_clock(
     if clocks or dates:
         return _one_of(clocks or dates, frame, what)
     for name, kind in kinds.items():
-        if tells[name] == 2 and kind == "times of day":
+        if kind == "times of day":
             raise InputError(
                 f"Expected times with a date. Received: {str(frame[name].dropna().iloc[0])!r} in "
                 f"{name!r} of {what}.",
@@ -204,6 +221,30 @@ def find_clock(
         )
     _refuse_unknown(frame, kinds, numbers, what)
     return Clock()
+
+
+def _refuse_apart_times(
+    day: str,
+    kinds: Mapping[str, str],
+    frame: pd.DataFrame,
+    numbers: Mapping[str, np.ndarray],
+    what: str,
+) -> None:
+    """Refuses dates that repeat beside what may be their time of day, in a form that is not read,
+    or beside another clock that does not repeat.
+    """
+    for name, kind in kinds.items():
+        if name in numbers and name_tells(name)[0] == 2:
+            values = numbers[name][np.isfinite(numbers[name])]
+            is_apart = name_tells(name)[1] is None and may_be_time_of_day(values)
+            is_finer = frame[day].nunique() > 1 and (np.diff(values) > 0).all()
+            if is_finer and not is_apart:
+                _one_of([day, name], frame, what)
+        else:
+            cells = frame[name].dropna().iloc[:LOOK].astype("str")
+            is_apart = kind == "words" and cells.str.fullmatch(_TIME_LIKE).mean() > 0.9
+        if is_apart and _are_days(frame[day]):
+            _refuse_apart(day, name, frame, what)
 
 
 def _refuse_apart(day: str, time: str, frame: pd.DataFrame, what: str) -> NoReturn:
@@ -284,10 +325,10 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
     if len(clock.columns) != 1:
         return None
     name = clock.columns[0]
-    factor = _FACTOR.search(f"{name} {units.get(name, '')}")
+    factor = _FACTOR.search(f"{name} [{units.get(name, '').strip('[]() ')}]")
     if factor and factor[1] != "1" and pd.api.types.is_numeric_dtype(clock.cells.dtype):
         raise InputError(
-            f"Expected times in s, ms, us or ns. Received: the unit {factor[0]!r} of {name!r} in "
+            f"Expected times in s, ms, us or ns. Received: a multiple of a unit in {name!r} of "
             f"{what}.",
             [_COUNT],
             "the times in one of these units, and with its name",
@@ -423,7 +464,8 @@ def _tells_time_of(signal: str, name: str) -> bool:
     beside `volts` and `time2` beside any.
     """
     own = [word for word in words_of(name) if word not in words_of(signal)]
-    return len(own) == 1 and own[0] in _TIMES.union("t")
+    is_of_one = len(words_of(name)) > 1 or any(map(str.isdigit, name))
+    return is_of_one and len(own) == 1 and own[0] in _TIMES.union("t")
 
 
 def _is_named_clock(name: str, values: np.ndarray) -> bool:
@@ -526,14 +568,14 @@ def _joined(
     has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # far dates have no text with one
     head = (cells.dt.tz_convert(None) if has_zone else cells).dropna().iloc[:LOOK].astype("str")
     whole_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
-    parts = {
-        part: name
-        for part, name in _parts_of(numbers).items()
-        if _are_whole(numbers[name], 0, _MOST.get(part, -1))
-    }
-    fractions = {part: name for part, name in parts.items() if part in _FRACTIONS}
-    if hours and is_day or not is_day and fractions and whole_seconds:
-        parts = fractions
+    parts = {part: name for part, name in _parts_of(numbers).items() if part in _MOST}
+    below = {part: name for part, name in parts.items() if part in _FRACTIONS}
+    if hours and is_day:
+        lacks = frame[hours[0]].dropna().iloc[:LOOK].astype("str").str.fullmatch(r" *\d\d?:\d\d *")
+        seconds = {"second": parts["second"]} if lacks.all() and "second" in parts else {}
+        parts = seconds | below
+    elif not is_day and below and whole_seconds:
+        parts = below
     elif not is_day or "hour" not in parts:
         parts = {}
     texts: list[str] = []
@@ -541,7 +583,7 @@ def _joined(
         texts = hours + [
             name
             for name, kind in kinds.items()
-            if kind == "words" and frame[name].dropna().isin(["AM", "PM"]).all()
+            if kind == "words" and frame[name].dropna().isin(["AM", "PM", "am", "pm"]).all()
         ]
         if pd.api.types.is_datetime64_any_dtype(cells.dtype):
             cells = cells.dt.strftime("%Y-%m-%d")
@@ -549,8 +591,25 @@ def _joined(
         cells = cells.astype("str").str.strip().ffill()
         for name in texts:
             cells = cells + " " + frame[name].astype("str").str.strip()
+    if parts and parts.keys() <= _FRACTIONS.keys():
+        stamps = parse_times(cells, "", drop=True).stamps
+        parts = parts if _makes_alike(stamps, _added(numbers, parts)) else {}
     columns = (dates[0], *texts, *parts.values())
     return Clock(columns, cells, _added(numbers, parts)) if len(columns) > 1 else None
+
+
+def _makes_alike(stamps: pd.DatetimeIndex, added: pd.Series) -> bool:
+    """Whether fractions of a second are those of a clock: they are the same throughout, or its
+    steps do not become less alike by them.
+    """
+
+    def spread(times: pd.DatetimeIndex) -> float:
+        steps = np.diff(times.dropna().as_unit("ns").asi8)
+        usual = np.median(steps) if len(steps) else 0
+        return float(np.mean(np.abs(steps / usual - 1))) if usual > 0 else np.inf
+
+    both = stamps + pd.TimedeltaIndex(added)
+    return added.nunique() == 1 or spread(both) <= spread(stamps) + _CLOSE
 
 
 def _are_days(cells: pd.Series) -> bool:
@@ -562,15 +621,26 @@ def _are_days(cells: pd.Series) -> bool:
 
 
 def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
-    """Returns the columns that are named like parts of a date or a time of day, by these parts."""
+    """Returns the columns that are named like parts of a date or a time of day, and may hold them,
+    by these parts.
+    """
     found: dict[str, str] = {}
-    for name in numbers:
-        part = _PART_OF.get(re.sub(r"\W|_", "", name.casefold()))
+    plain = {name: re.sub(r"\W|_", "", name.casefold()) for name in numbers}
+    for name, word in plain.items():
+        part = _PART_OF.get(word)
         # the second of `MM` and `mm`
-        if name.strip().casefold() == "mm" and {"month", "doy"} & set(found):
+        if word == "mm" and {"month", "doy"} & set(found):
             part = "minute"
-        if part is not None:
+        if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
             found.setdefault(part, name)
+    if "hour" not in found:  # minutes of no hour; seconds are those of a day
+        found.pop("minute", None)
+    most = _MOST if "hour" in found else _MOST | {"second": 86_400}
+    for part in found.keys() & most.keys():
+        values = numbers[found[part]][np.isfinite(numbers[found[part]])]
+        is_whole = part in ("hour", "second") or (values % 1 == 0).all()
+        if not is_whole or not ((values >= 0) & (values <= most[part])).all():
+            del found[part]
     return found
 
 

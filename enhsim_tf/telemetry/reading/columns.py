@@ -313,7 +313,7 @@ def _labels_of(
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
     """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
     words = set(words_of(name))
-    if not (_UNNAMED(name) or words and words <= _ROWS) or is_epoch(values):
+    if not (words and words <= _ROWS or _UNNAMED(name) and not is_epoch(values)):
         return False
     return len(values) == 1 or bool(len(values)) and bool(np.mean(np.diff(values) == 1) >= 0.9)
 

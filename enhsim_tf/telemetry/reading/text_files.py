@@ -29,6 +29,7 @@ _HEAD = 100_000  # bytes that are searched for blanks before cells
 _LOOK = 2_000  # cells of a column that are searched for a decimal comma
 # plain ones, which pandas reads faster than text; other cells in their column leave it text
 _TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d").match
+_DIGITS = re.compile(r"[+-]?[.,]?\d").match
 _ANNOTATION = re.compile(r"^#(?:group|datatype|default)\b", re.MULTILINE)
 _ANNOTATED = re.compile(r"((?:^#.*\n)+)((?:^(?!#).*\n?)*)", re.MULTILINE)
 
@@ -119,8 +120,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
         )
     repeated = _repeated_headers(frame, dialect.names, name, above)
     if repeated:
-        frame = frame.astype(object)
-        frame.iloc[repeated] = None
+        frame = frame.drop(index=repeated).reset_index(drop=True)
         lines = ", ".join(str(row + above + 1) for row in repeated[:3])
         findings.append(
             Finding(
@@ -130,7 +130,9 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 f"{lines})",
             )
         )
-    return table_of(frame, dialect, name, decimal, findings, options.skip_rows)
+    table = table_of(frame, dialect, name, decimal, findings, options.skip_rows)
+    behind_them = [(row - before, row + above + 2, name) for before, row in enumerate(repeated)]
+    return dataclasses.replace(table, places=Places((*table.places.files, *behind_them)))
 
 
 def _may_be_ragged(frame: pd.DataFrame, data: bytes, dialect: Dialect) -> bool:
@@ -309,7 +311,9 @@ def _repeated_headers(
         is_same = all(cell in (each, "nan") for cell, each in zip(cells, names, strict=True))
         if is_same or first.iloc[row].startswith("$RT_"):
             rows.append(row)
-        elif 2 * sum(cell in names for cell in cells) > len(cells):
+        elif 2 * sum(cell in names for cell in cells) > len(cells) or (
+            cells[place] == names[place] and not any(map(_DIGITS, cells))
+        ):
             raise InputError(
                 f"Expected one order of columns. Received: {', '.join(cells)[:60]} at line "
                 f"{row + above + 1} of {name}, below {', '.join(names)[:60]}.",
