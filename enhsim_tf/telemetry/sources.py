@@ -67,7 +67,7 @@ def read_source(
     if isinstance(source, str):
         return _read_influx(source, columns, time, options)
     if isinstance(source, Path) and source.suffix.lower() == ".npy" and not source.is_dir():
-        return _read_array(source, columns, time)
+        return _read_array(source, columns, time, options)
     return read_table_channels(source, columns, time, options)
 
 
@@ -116,7 +116,9 @@ def _read_influx(
     return Channels({store.location.field: RawChannel.of(series, options)})
 
 
-def _read_array(path: Path, columns: list[str] | None, time: str | None) -> Channels:
+def _read_array(
+    path: Path, columns: list[str] | None, time: str | None, options: Cleaning
+) -> Channels:
     """Reads the columns of an array.
 
     In telemanom's SMAP and MSL data, column 0 is the value, and each other column is 1 at the
@@ -141,13 +143,15 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None) -> Chan
             f"in {path.name}. Reshape it."
         )
     if columns is None and array.ndim == 2:
-        refuse_channels_first(array, path.name)
+        refuse_channels_first(array.shape, path.name)
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
     if columns is None and array.shape[1] > MAX_COLUMNS:
         raise InputError(
             f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in "
             f"{path.name}. Name those to be read."
         )
+    if array.dtype == bool and options.states:
+        array = array.astype(np.float64)
     known = {str(number): number for number in range(array.shape[1])}
     last = array.shape[1] - 1
     found = {}

@@ -384,6 +384,20 @@ def test_rows_that_two_exports_share_are_merged_and_others_at_their_times_are_re
         clean(series)
 
 
+@pytest.mark.parametrize("interval_s", [2.4, 2.5, 7.3])
+@pytest.mark.parametrize("cut", [np.floor, np.round])
+def test_times_that_were_cut_to_whole_seconds_keep_their_interval(interval_s, cut):
+    cleaned = clean(pd.Series(np.arange(300) % 7.0, cut(interval_s * np.arange(300))))
+    assert cleaned.telemetry.interval_s == pytest.approx(interval_s, rel=1e-9)
+    assert len(cleaned.telemetry) == 300
+
+
+def test_a_clock_that_lost_every_third_digit_is_not_averaged(refused):
+    times = np.floor(np.arange(60) * 40 / 60) * 60
+    with refused("a clock that lost digits"):
+        clean(pd.Series(np.arange(60.0), times))
+
+
 def test_steps_that_differ_are_rows_missing_and_no_other_rate():
     times = START + pd.to_timedelta(np.cumsum([1] * 200 + [3, 4] * 40), unit="s")
     assert cleaned_of(with_times(times, VALUES[: len(times)])).report.find("other rates") is None

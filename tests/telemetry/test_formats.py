@@ -5,7 +5,9 @@ import json
 
 import h5py
 import numpy as np
+import openpyxl
 import pandas as pd
+import pyarrow as pa
 import pytest
 import scipy.io
 
@@ -152,9 +154,15 @@ def test_texts_of_fixed_length_in_records_of_hdf5_are_times(tmp_path):
 
 def test_units_beside_data_of_hdf5_are_those_of_the_clock(tmp_path, refused):
     hdf5(tmp_path / "a.h5", log=FRAME)
-    for unit, interval_s in (("ms", 0.0005), (np.bytes_("min"), 30.0)):
+    for key, unit, interval_s in (
+        ("units", "ms", 0.0005),
+        ("units", np.bytes_("min"), 30.0),
+        ("Unit", ["msec."], 0.0005),
+        ("UNITS", "s since start", 0.5),
+    ):
         with h5py.File(tmp_path / "a.h5", "r+") as file:
-            file["log/time"].attrs["units"] = unit
+            file["log/time"].attrs.clear()
+            file["log/time"].attrs[key] = unit
         (telemetry,) = read_telemetry(tmp_path / "a.h5")
         assert telemetry.interval_s == pytest.approx(interval_s)
 
@@ -181,6 +189,47 @@ def test_signals_of_a_simulation_are_read_with_their_time(tmp_path):
         np.testing.assert_allclose(telemetry.values, FRAME[["volts", "amps"]], rtol=1e-6)
 
 
+def test_tables_of_equal_names_in_two_groups_are_both_offered(tmp_path, refused):
+    hdf5(tmp_path / "a.h5", one=FRAME, two=FRAME)
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        for group in ("one", "two"):
+            file[f"{group}/cal"] = np.arange(12)
+    with refused("--table one/amps", "--table two/cal"):
+        read_telemetry(tmp_path / "a.h5")
+    (telemetry,) = read_telemetry(tmp_path / "a.h5", Cleaning(table="two/amps"))
+    assert len(telemetry) == N
+
+
+def test_files_of_other_units_or_zones_are_not_joined(tmp_path, refused):
+    for name, unit in (("a", "s"), ("b", "ms")):
+        hdf5(tmp_path / f"{name}.h5", log=FRAME)
+        with h5py.File(tmp_path / f"{name}.h5", "r+") as file:
+            file["log/time"].attrs["units"] = unit
+    times = pd.date_range("2024", periods=N, freq="s")
+    for name, zone in (("a", "UTC"), ("b", None)):
+        FRAME.assign(time=times.tz_localize(zone)).to_parquet(tmp_path / f"{name}.parquet")
+    for ending in ("h5", "parquet"):
+        with refused("'time' of different units", f"a.{ending} to b.{ending}"):
+            read_telemetry([tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"])
+
+
+def test_an_index_with_a_name_and_spans_of_arrow_are_clocks():
+    index = pd.RangeIndex(0, 500 * N, 500, name="time_ms")
+    spans = pd.to_timedelta(SECONDS, unit="s")
+    spans = pd.Series(spans).astype(pd.ArrowDtype(pa.duration("ms")))
+    for frame in (FRAME[["volts"]].set_axis(index), FRAME[["volts"]].assign(time=spans)):
+        (telemetry,) = read_telemetry(frame)
+        assert (telemetry.columns, telemetry.interval_s) == (("volts",), 0.5)
+
+
+def test_an_empty_sheet_and_numbered_names_that_exist_are_refused(tmp_path, refused):
+    openpyxl.Workbook().save(tmp_path / "a.xlsx")
+    with refused("it is empty"):
+        read_telemetry(tmp_path / "a.xlsx")
+    with refused("'v.1'"):
+        read_telemetry(pd.DataFrame(np.ones((9, 4)), columns=["time", "v", "v", "v.1"]))
+
+
 def test_the_last_line_of_json_may_be_cut(tmp_path, refused):
     text = FRAME.to_json(orient="records", lines=True)
     (tmp_path / "a.jsonl").write_text(text + '{"time": 4')
@@ -197,6 +246,12 @@ def test_lists_of_values_are_rows(tmp_path, refused):
     (tmp_path / "a.json").write_text(json.dumps([list(FRAME), *rows]))
     (telemetry,) = read_telemetry(tmp_path / "a.json")
     np.testing.assert_allclose(telemetry.values, FRAME[["volts", "amps"]], rtol=1e-6)
+    (tmp_path / "a.json").write_text(json.dumps([["2024-03-01T10:00:00Z", "1"], ["2024", "2"]]))
+    assert len(read_source(tmp_path / "a.json")["column 1"].cells) == 2
+    for held in (np.ones((2, 200)).tolist(), {"values": np.ones((2, 200)).tolist()}):
+        (tmp_path / "a.json").write_text(json.dumps(held))
+        with refused("channels first"):
+            read_telemetry(tmp_path / "a.json")
     (tmp_path / "a.json").write_text(json.dumps([*rows, [40.0, 1.0]]))
     with refused("lists of 2 to 3 values"):
         read_telemetry(tmp_path / "a.json")

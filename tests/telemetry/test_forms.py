@@ -306,6 +306,38 @@ READ = {
         table("time,ns,v", stamps("%Y-%m-%d %H:%M:%S"), [7 * 10**7] * N, VALUES),
         START + pd.Timedelta("70ms"),
     ),
+    "elapsed times beside a clock": (
+        table(
+            "timestamp,uptime,v",
+            TIMES.as_unit("s").asi8,
+            [f"{k // 60}:{k % 60:02d}:00" for k in range(1_410, 1_410 + N)],
+            VALUES,
+        ),
+        START,
+    ),
+    "year, month, day and a time of day": (
+        table("Year,Month,Day,Time,v", *(stamps(f"%{x}") for x in "Ymd"), stamps("%H:%M"), VALUES),
+        START,
+    ),
+    "a date, hours, minutes and seconds": (
+        table(
+            "date,h,min,sec,v", stamps("%Y-%m-%d"), *(stamps(f"%{x}") for x in "HMS"), VALUES
+        ).replace("date,h", "date,hour"),
+        START,
+    ),
+    "midnight as the end of a day": (
+        table(
+            "date,clock,v",
+            (TIMES + pd.Timedelta("23.49h")).strftime("%Y-%m-%d"),
+            (TIMES + pd.Timedelta("23.5h")).strftime("%H:%M:%S"),
+            VALUES,
+        ).replace("2024-03-01,00:00:00", "2024-03-01,24:00:00"),
+        START + pd.Timedelta("23.5h"),
+    ),
+    "halves of a day in small letters": (
+        table("time,v", stamps("%Y-%m-%d %I:%M %p").str.lower(), VALUES),
+        START,
+    ),
     "the day of a test beside its clock": (
         table("test_date,time_s,v", ["2024-03-01"] * N, SECONDS, VALUES),
         ZERO,
@@ -546,6 +578,25 @@ REFUSED = {
         table("time,v,w", SECONDS, VALUES, VALUES, below="time,w,v\n3600,1,2\n"),
         "time, w, v at line 62",
     ),
+    "a time of day of an unknown form": (
+        table("Date;Heure;T", stamps("%d/%m/2024"), stamps("%Hh%M"), VALUES, separator=";").replace(
+            "01/03", "31/03"
+        ),
+        "one column, as 2024",
+    ),
+    "hours and minutes in one number": (
+        table("Time,v", (TIMES + pd.Timedelta("9h30min")).strftime("%H%M"), VALUES),
+        "times of day or seconds",
+    ),
+    "a finer clock beside dates": (
+        table("time_ms,date,v", 500 * np.arange(N), MINUTES.repeat(30)[:N], VALUES),
+        "--time time_ms",
+    ),
+    "another table further down": (
+        table("time,v", SECONDS, VALUES, below="time,w\n3600,1\n"),
+        "time, w at line 62",
+    ),
+    "times of day under another name": (table("hms,v", stamps("%H:%M:%S"), VALUES), "with a date"),
     "a multiple of a unit": (
         table("Time [10ms],v", 6_000 * np.arange(N), VALUES),
         "multiple of a unit",
@@ -611,6 +662,34 @@ def test_a_form_with_two_meanings_is_refused_and_read_as_the_message_says(tmp_pa
         cleaned = clean(only(read_source(tmp_path / "a.csv", **arguments)))
         assert cleaned.longest.interval_s == pytest.approx(interval_s)
         np.testing.assert_allclose(cleaned.longest.values[:, 0], VALUES, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("header", "form", "values"),
+    [
+        ("Year,Month,Day,Mean,Min,Max", "%Y,%m,%d", ([8, 9, 7], [3, 5, 2], [14, 15, 12])),
+        ("Year,Month,Day,mm,b,c", "%Y,%m,%d", ([3, 5, 2], [8, 9, 7], [1, 2, 1])),
+        ("time,ms,b,c", "%Y-%m-%dT00:00:00", ([23, 950, 480], [8, 9, 7], [1, 2, 1])),
+    ],
+)
+def test_what_is_named_like_a_part_of_a_time_but_is_none_is_a_channel(
+    tmp_path, header, form, values
+):
+    dates = pd.date_range("2024-03-01", periods=12, freq="D").strftime(form)
+    if "ms" in header:
+        dates = pd.date_range("2024-03-01", periods=12, freq="s").strftime("%Y-%m-%dT%H:%M:%S")
+    (tmp_path / "a.csv").write_text(table(header, dates, *(4 * each for each in values)))
+    channels = read_source(tmp_path / "a.csv")
+    assert list(channels) == header.split(",")[-3:]
+    interval_s = 1 if "ms" in header else 86_400
+    assert clean(channels[header.split(",")[-3]]).telemetry.interval_s == interval_s
+
+
+def test_lines_that_repeat_the_names_leave_no_gap(tmp_path):
+    (tmp_path / "a.csv").write_text("a,b\n1.5,2\n2.5,x\na,b\n4.5,5\n5.5,y\n")
+    channels = read_source(tmp_path / "a.csv")
+    assert clean(channels["a"]).telemetry.values[:, 0].tolist() == [1.5, 2.5, 4.5, 5.5]
+    assert [channels["b"].places.of(row) for row in (1, 3)] == ["line 3", "line 6"]
 
 
 def test_numbers_that_turn_hexadecimal_further_down_are_words(tmp_path, refused):

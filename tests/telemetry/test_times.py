@@ -95,6 +95,12 @@ def test_dates_that_begin_again_are_refused(refused, minutes, row, words, has_zo
         refuse_steps_back(times, np.arange(len(minutes))[::order], Log(), "volts", has_zone)
 
 
+def test_what_fills_a_gap_late_is_no_clock_that_was_set():
+    blocks = [range(200, 400), range(200), range(400, 500), range(540, 600), range(500, 540)]
+    minutes = np.array([minute for block in blocks for minute in block])
+    refuse_steps_back(60 * 10**9 * minutes, np.arange(600), Log(), "volts", has_zone=True)
+
+
 @pytest.mark.parametrize("minutes", [1, 10, 20, 30, 60, 240, 720, 1_440])
 def test_dates_that_go_down_throughout_begin_nowhere_again(minutes):
     times = 60 * 10**9 * minutes * np.arange(400)[::-1]

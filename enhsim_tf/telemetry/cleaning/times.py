@@ -111,7 +111,7 @@ def parse_times(
     is_format = form is not None and "%" in form
     if pd.api.types.is_datetime64_any_dtype(kind):
         return reader.of_dates(times)
-    if pd.api.types.is_timedelta64_dtype(kind):
+    if getattr(kind, "kind", "") == "m":
         return reader.of_numbers(times.dt.total_seconds(), "s")
     if not (is_plain(times) or is_text(times)):
         raise InputError(

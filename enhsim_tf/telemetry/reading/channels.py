@@ -206,6 +206,12 @@ def _with_different_names(
         f"{name}.{number}" if name in repeated else name
         for name, number in zip(given, counts, strict=True)
     ]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(
+            f"Expected columns of different names. Received: {twice!r} beside columns of one name, "
+            f"which are numbered, in {what}. Rename them."
+        )
     times = () if time is None else (time,)
     asked = [name for name in columns or () if name in repeated]
     for name in [*asked, *(options.label_column or ()), *(options.series_column or ()), *times]:

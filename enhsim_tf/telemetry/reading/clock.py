@@ -333,7 +333,7 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
             [_COUNT],
             "the times in one of these units, and with its name",
         )
-    form = name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
+    form = name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []().").casefold())
     if (
         form is None
         and pd.api.types.is_numeric_dtype(clock.cells.dtype)

@@ -211,7 +211,7 @@ def _kind_of(cells: pd.Series) -> str:
         return _kind_of(cells.iloc[:LOOK].astype(object))
     if pd.api.types.is_datetime64_any_dtype(kind) or isinstance(kind, pd.PeriodDtype):
         return "dates"
-    if pd.api.types.is_timedelta64_dtype(kind):
+    if getattr(kind, "kind", "") == "m":
         return "spans"
     if pd.api.types.is_bool_dtype(kind):
         return "words"

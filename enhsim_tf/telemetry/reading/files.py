@@ -111,7 +111,7 @@ def _with_plain_columns(table: Table, name: str) -> Table:
     """Turns an index that means something into a column, and names into text."""
     frame = table.frame
     # the rows of a slice are counted from 0 as well
-    is_counted = isinstance(frame.index, pd.RangeIndex)
+    is_counted = isinstance(frame.index, pd.RangeIndex) and frame.index.name is None
     if frame.index.nlevels == 1 and frame.index.name is None:
         frame = frame.rename_axis("column 0")  # as in text
     frame = frame.reset_index(drop=is_counted, allow_duplicates=True)
@@ -138,6 +138,16 @@ def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
             raise InputError(
                 f"Expected files with the same columns. Received: {other!r} not exactly once in "
                 f"{paths[0].name} and {path.name}. Read them one by one."
+            )
+    for name in names:
+        columns = [table.frame[name].dtype for table in tables]
+        dates = [each for each in columns if pd.api.types.is_datetime64_any_dtype(each)]
+        has_zone = {isinstance(each, pd.DatetimeTZDtype) for each in dates}
+        if len(has_zone) > 1 or len({table.units.get(name, "") for table in tables}) > 1:
+            raise InputError(
+                f"Expected files that are written alike. Received: {name!r} of different units, or "
+                f"with and without a zone, in {paths[0].name} to {paths[-1].name}. Read them one "
+                "by one."
             )
     places = []
     row = 0

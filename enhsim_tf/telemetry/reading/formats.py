@@ -36,8 +36,11 @@ _FOREIGN = {
     ),
 }
 # attributes of the conventions for climate and forecast by which values are to be converted
-_PACKED = {"scale_factor", "add_offset"}
-_SINCE_1970 = re.compile("(?:s|sec|seconds) since 1970-01-01").match
+_PACKED = {"scale_factor": 1, "add_offset": 0}
+_SINCE_1970 = re.compile(
+    r"(?:s|secs?|seconds?) since 1970-0?1-0?1(?:[T ]0?0:00(?::00(?:\.0*)?)?)?(?: ?(?:Z|UTC))?",
+    re.IGNORECASE,
+).fullmatch
 _FEWEST_ROWS = 3  # with numbers, below which a sheet is no telemetry
 
 
@@ -53,7 +56,7 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
     """
     with reading(name):
         text = content.decode("utf-8-sig").strip()
-        is_whole = text.startswith(("[", "{\n", "{\r"))
+        is_whole = text.startswith("[") or _is_json(text)
         lines = [text] if is_whole else [line for line in text.splitlines() if line.strip()]
         records = [json.loads(line) for line in lines[:-1]]
         findings = []
@@ -84,13 +87,22 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
     return Table(frame, findings=tuple(findings))
 
 
+def _is_json(text: str) -> bool:
+    try:
+        json.loads(text)
+    except json.JSONDecodeError:
+        return False
+    return True
+
+
 def _frame_of(records: Sequence[Any]) -> pd.DataFrame:
     """Makes a table of records, or of lists of one length, of which the first may hold names."""
     if not records or not all(isinstance(record, list) for record in records):
         return pd.json_normalize(records)
     if len(lengths := {len(record) for record in records}) > 1:
         raise ValueError(f"lists of {min(lengths)} to {max(lengths)} values")
-    if all(isinstance(cell, str) for cell in records[0]):
+    refuse_channels_first((len(records), len(records[0])), "the lists")
+    if all(isinstance(cell, str) and not re.match(r"\s*[+-]?\.?\d", cell) for cell in records[0]):
         return pd.DataFrame(records[1:], columns=records[0])
     return pd.DataFrame(records).rename(columns="column {}".format)
 
@@ -106,6 +118,8 @@ def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str
             lists |= _lists_of(value, inside)
         elif isinstance(value, list) and value:
             is_records = isinstance(value[0], dict)
+            if isinstance(value[0], list):
+                refuse_channels_first((len(value), len(value[0])), inside)
             frame = pd.json_normalize(value) if is_records else pd.DataFrame(value)
             cells = frame[[column for column in frame if frame[column].dtype == object]]
             if cells.map(lambda cell: isinstance(cell, list | dict)).any(axis=None):
@@ -150,7 +164,8 @@ def read_excel(content: bytes, name: str, options: Cleaning) -> Table:
     frame = pd.DataFrame([row[:width] for row in rows], dtype=object)
     head = frame.head(100).replace(r"\s", " ", regex=True)
     text = head.to_csv(sep="\t", header=False, index=False)
-    dialect = find_dialect(text, name, options.no_header, "\t")
+    with reading(name):
+        dialect = find_dialect(text, name, options.no_header, "\t")
     frame = frame.iloc[dialect.first_line :].reset_index(drop=True).infer_objects()
     return table_of(frame, dialect, name, None, findings, options.skip_rows)
 
@@ -208,11 +223,12 @@ def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
         if not isinstance(item, h5py.Dataset) or item.attrs.get("MATLAB_class") == b"char":
             return
         parent, _, key = path.rpartition("/")
-        unit = item.attrs.get("units", "")
+        stated = {key.casefold(): np.ravel(value) for key, value in item.attrs.items()}
+        unit = next((stated[key][0] for key in ("units", "unit") if len(stated.get(key, ""))), "")
         units[path] = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
-        packed = _PACKED.intersection(item.attrs)
-        if packed or " since " in units[path] and not _SINCE_1970(units[path]):
-            stated = f"the units {units[path]!r}" if not packed else min(packed)
+        packed = [key for key, same in _PACKED.items() if np.any(stated.get(key, same) != same)]
+        if packed or re.search(r" since \d", units[path]) and not _SINCE_1970(units[path]):
+            stated = f"the units {units[path]!r}" if not packed else packed[0]
             raise InputError(
                 f"Expected values as they are. Received: {stated} of {path!r} in {name}.",
                 (),
@@ -249,7 +265,7 @@ def _of_arrays(
         if values.ndim == 1:
             columns[key] = values
         else:
-            refuse_channels_first(values, f"{key} of {name}")
+            refuse_channels_first(values.shape, f"{key} of {name}")
             columns |= {f"{key}.{number}": column for number, column in enumerate(values.T)}
     if not tables:
         raise InputError(
@@ -257,9 +273,14 @@ def _of_arrays(
             "variables of their own, or as CSV."
         )
     lengths = [group for group, _ in tables]
+    firsts = [next(iter(columns)) for columns in tables.values()]
     named = {
-        group if group and lengths.count(group) == 1 else next(iter(columns)): columns
-        for (group, _), columns in tables.items()
+        group
+        if group and lengths.count(group) == 1
+        else f"{group}/{first}"
+        if group and firsts.count(first) > 1
+        else first: columns
+        for ((group, _), columns), first in zip(tables.items(), firsts, strict=True)
     }
     title = chosen_table(named, name, options)
     frame = pd.DataFrame({key: pd.Series(values) for key, values in named[title].items()})
@@ -268,12 +289,12 @@ def _of_arrays(
     return Table(frame, units=stated)
 
 
-def refuse_channels_first(values: np.ndarray, what: str) -> None:
+def refuse_channels_first(shape: tuple[int, int], what: str) -> None:
     """Refuses a matrix that seems to have a channel in each row."""
-    rows, columns = values.shape
+    rows, columns = shape
     if rows <= 64 and columns >= 10 * rows and columns >= 100:
         raise InputError(
-            f"Expected samples in rows, channels in columns. Received: shape {values.shape} in "
+            f"Expected samples in rows, channels in columns. Received: shape {shape} in "
             f"{what}, which seems to have channels first. Save it transposed (array.T)."
         )
 
@@ -315,6 +336,10 @@ CONVERT = {
     ".ulg": "pyulog",
     ".bag": "rosbags",
     ".nc": "xarray",
+    ".bz2": "bzip2 -d",
+    ".xz": "xz -d",
+    ".tar": "tar",
+    ".tgz": "tar",
     ".xls": "a spreadsheet program, as .xlsx",
     ".npz": "numpy.load, as .npy",
 }
