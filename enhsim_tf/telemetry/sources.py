@@ -19,7 +19,7 @@ from enhsim_tf.telemetry.cleaning.report import Finding
 from enhsim_tf.telemetry.influx_store import InfluxStore
 from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.reading.channels import Channels, read_table_channels
-from enhsim_tf.telemetry.reading.clock import NO_TIME
+from enhsim_tf.telemetry.reading.clock import NO_TIME, is_regular
 from enhsim_tf.telemetry.reading.formats import refuse_channels_first
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.source_kinds import existing
@@ -152,6 +152,13 @@ def _read_array(
         )
     if array.dtype == bool and options.states:
         array = array.astype(np.float64)
+    if columns is None and time is None and array.shape[1] > 1 and is_regular(array[:, 0]):
+        raise InputError(
+            f"Expected channels without a clock. Received: column 0 of {path.name}, which "
+            "increases in equal steps, as a clock does.",
+            [{"columns": [str(number) for number in range(1, array.shape[1])]}, {"time": NO_TIME}],
+            "a table with names",
+        )
     known = {str(number): number for number in range(array.shape[1])}
     last = array.shape[1] - 1
     found = {}

@@ -338,6 +338,12 @@ READ = {
         table("time,v", stamps("%Y-%m-%d %I:%M %p").str.lower(), VALUES),
         START,
     ),
+    "row names of R": (
+        table(
+            '"time" "v"', [f'"{1 + k}"' for k in range(N)], SECONDS + 1e-9, VALUES, separator=" "
+        ),
+        ZERO,
+    ),
     "the day of a test beside its clock": (
         table("test_date,time_s,v", ["2024-03-01"] * N, SECONDS, VALUES),
         ZERO,

@@ -133,7 +133,7 @@ def _is_increasing(values: np.ndarray) -> bool:
     return bool(len(steps)) and bool(np.mean(steps >= 0) >= 0.9 and np.mean(steps > 0) >= 0.3)
 
 
-def _is_regular(values: np.ndarray) -> bool:
+def is_regular(values: np.ndarray) -> bool:
     """Whether numbers increase nearly throughout, nearly always by one step or a multiple of it."""
     steps = np.diff(values[np.isfinite(values)])
     if len(steps) < _FEWEST or np.mean(steps > 0) < 0.95:
@@ -171,7 +171,7 @@ def find_clock(
     if (joined := _joined(frame, kinds, dates or compact, numbers)) is not None:
         return joined
     dates = [name for name in dates if tells[name]] or dates
-    if dates and frame[dates[0]].duplicated().mean() > _OFTEN:
+    if dates and frame[dates[0]].iloc[: 50 * LOOK].duplicated().mean() > _OFTEN:
         _refuse_apart_times(dates[0], kinds, frame, numbers, what)
     if varying:
         return _one_of(dates, frame, what)
@@ -259,7 +259,7 @@ def _refuse_apart(day: str, time: str, frame: pd.DataFrame, what: str) -> NoRetu
 
 def _may_be_clock(tells: int, values: np.ndarray) -> bool:
     return tells > 0 and (
-        _is_increasing(values) or tells == 2 and (is_epoch(values) or _is_regular(values[::-1]))
+        _is_increasing(values) or tells == 2 and (is_epoch(values) or is_regular(values[::-1]))
     )
 
 
@@ -281,7 +281,7 @@ def _refuse_unknown(
         for name, each in numbers.items()
         if is_epoch(each) and np.ptp(each) > 0 <= np.diff(each).min()
     )
-    ramps = [name for name, values in numbers.items() if _is_regular(values)]
+    ramps = [name for name, values in numbers.items() if is_regular(values)]
     groups = _signals_of(kinds, ramps)
     if not all(_is_nearly(numbers[ramps[0]], numbers[name]) for name in groups):
         raise InputError(
