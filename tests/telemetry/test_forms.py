@@ -676,18 +676,19 @@ def test_a_form_with_two_meanings_is_refused_and_read_as_the_message_says(tmp_pa
         ("Year,Month,Day,Mean,Min,Max", "%Y,%m,%d", ([8, 9, 7], [3, 5, 2], [14, 15, 12])),
         ("Year,Month,Day,mm,b,c", "%Y,%m,%d", ([3, 5, 2], [8, 9, 7], [1, 2, 1])),
         ("time,ms,b,c", "%Y-%m-%dT00:00:00", ([23, 950, 480], [8, 9, 7], [1, 2, 1])),
+        ("time,ns,b,c", "%Y-%m-%dT00:00:00", ([5, 7, 6], [8, 9, 7], [1, 2, 1])),
     ],
 )
 def test_what_is_named_like_a_part_of_a_time_but_is_none_is_a_channel(
     tmp_path, header, form, values
 ):
     dates = pd.date_range("2024-03-01", periods=12, freq="D").strftime(form)
-    if "ms" in header:
+    if "time" in header:
         dates = pd.date_range("2024-03-01", periods=12, freq="s").strftime("%Y-%m-%dT%H:%M:%S")
     (tmp_path / "a.csv").write_text(table(header, dates, *(4 * each for each in values)))
     channels = read_source(tmp_path / "a.csv")
     assert list(channels) == header.split(",")[-3:]
-    interval_s = 1 if "ms" in header else 86_400
+    interval_s = 1 if "time" in header else 86_400
     assert clean(channels[header.split(",")[-3]]).telemetry.interval_s == interval_s
 
 

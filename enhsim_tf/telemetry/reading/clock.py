@@ -599,8 +599,8 @@ def _joined(
 
 
 def _makes_alike(stamps: pd.DatetimeIndex, added: pd.Series) -> bool:
-    """Whether fractions of a second are those of a clock: they are the same throughout, or its
-    steps do not become less alike by them.
+    """Whether fractions of a second are those of a clock: they are the same throughout, or go
+    through a tenth of a second or more, and its steps do not become less alike by them.
     """
 
     def spread(times: pd.DatetimeIndex) -> float:
@@ -609,7 +609,10 @@ def _makes_alike(stamps: pd.DatetimeIndex, added: pd.Series) -> bool:
         return float(np.mean(np.abs(steps / usual - 1))) if usual > 0 else np.inf
 
     both = stamps + pd.TimedeltaIndex(added)
-    return added.nunique() == 1 or spread(both) <= spread(stamps) + _CLOSE
+    if added.nunique() == 1:
+        return added.iloc[0] == pd.Timedelta(0) or added.iloc[0] >= pd.Timedelta("1ms")
+    is_wide = added.max() - added.min() >= pd.Timedelta("100ms")
+    return is_wide and spread(both) <= spread(stamps) + _CLOSE
 
 
 def _are_days(cells: pd.Series) -> bool:
