@@ -654,7 +654,8 @@ def _added(numbers: Mapping[str, np.ndarray], parts: Mapping[str, str]) -> pd.Se
         for part, unit in _ADDED.items()
         if part in parts
     ]
-    return sum(spans[1:], spans[0]).dt.round("us") if spans else None
+    unit = "ns" if "ns" in parts else "us"
+    return sum(spans[1:], spans[0]).dt.round(unit) if spans else None
 
 
 def _date_parts(numbers: Mapping[str, np.ndarray]) -> Clock | None:
