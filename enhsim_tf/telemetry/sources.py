@@ -152,7 +152,8 @@ def _read_array(
         )
     if array.dtype == bool and options.states:
         array = array.astype(np.float64)
-    if columns is None and time is None and array.shape[1] > 1 and is_regular(array[:, 0]):
+    may_be_table = columns is None and time is None and array.shape[1] > 1
+    if may_be_table and array.dtype.kind in "fiu" and is_regular(array[:, 0]):
         raise InputError(
             f"Expected channels without a clock. Received: column 0 of {path.name}, which "
             "increases in equal steps, as a clock does.",

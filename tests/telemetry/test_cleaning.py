@@ -382,6 +382,17 @@ def test_rows_that_two_exports_share_are_merged_and_others_at_their_times_are_re
     series.iloc[40:60] += 1
     with refused("cover the same time once more"):
         clean(series)
+    zoned = series.tz_localize("UTC")
+    with refused("same_time='last'"):
+        clean(zoned)
+    cleaned = clean(zoned, Cleaning(same_time="last"))
+    assert cleaned.telemetry.values[20:40, 0].tolist() == [row % 7 + 1 for row in range(20, 40)]
+
+
+def test_rows_without_a_value_do_not_take_a_clock_back():
+    times = pd.date_range("2024", periods=60, freq="s", tz="UTC")
+    values = np.r_[np.arange(60.0) % 7, np.full(60, np.nan)]
+    assert len(clean(pd.Series(values, times.append(times))).telemetry) == 60
 
 
 @pytest.mark.parametrize("interval_s", [2.4, 2.5, 7.3])

@@ -338,6 +338,23 @@ READ = {
         table("time,v", stamps("%Y-%m-%d %I:%M %p").str.lower(), VALUES),
         START,
     ),
+    "seconds of the day beside hours and minutes": (
+        table("Date,Time,sec,v", stamps("%Y-%m-%d"), stamps("%H:%M"), SECONDS + 1, VALUES),
+        START,
+    ),
+    "minutes of the day": (
+        table("year,doy,minute,v", stamps("%Y"), stamps("%j"), np.arange(N), VALUES),
+        START,
+    ),
+    "a unit of one": (table("Time (1.0 s),v", SECONDS, VALUES), ZERO),
+    "spans that fall": (
+        table("time,v", [f"{s} s" for s in SECONDS[::-1]], VALUES[::-1]),
+        ZERO,
+    ),
+    "a separator behind each row": (
+        table("time,v,", 1 + np.arange(N) * 60, VALUES, [""] * N),
+        ZERO + pd.Timedelta("1s"),
+    ),
     "row names of R": (
         table(
             '"time" "v"', [f'"{1 + k}"' for k in range(N)], SECONDS + 1e-9, VALUES, separator=" "
@@ -590,6 +607,10 @@ REFUSED = {
         ),
         "one column, as 2024",
     ),
+    "a date that stays and a time without a unit": (
+        table("date,time,v", ["2024-03-01"] * N, np.arange(N), VALUES),
+        "--time time",
+    ),
     "hours and minutes in one number": (
         table("Time,v", (TIMES + pd.Timedelta("9h30min")).strftime("%H%M"), VALUES),
         "times of day or seconds",
@@ -692,6 +713,32 @@ def test_what_is_named_like_a_part_of_a_time_but_is_none_is_a_channel(
     assert clean(channels[header.split(",")[-3]]).telemetry.interval_s == interval_s
 
 
+@pytest.mark.parametrize("part", ["second", "hour"])
+def test_a_part_of_a_time_that_is_out_of_range_loses_its_row_alone(part):
+    frame = pd.DataFrame(
+        {"year": 2024, "month": 3, "day": 1, "hour": TIMES.hour, "minute": TIMES.minute}
+    ).assign(second=0, v=VALUES)
+    frame.loc[30, part] = 99
+    cleaned = clean(only(read_source(frame)))
+    assert cleaned.report.find("missing times").count == 1
+    np.testing.assert_allclose(
+        np.delete(cleaned.telemetry.values[:, 0], 30), np.delete(VALUES, 30), atol=1e-5
+    )
+
+
+def test_a_damaged_time_of_day_makes_no_elapsed_times(tmp_path, refused):
+    cells = [*stamps("%H:%M:%S")[:30], "99:59:59", *stamps("%H:%M:%S")[31:]]
+    (tmp_path / "a.csv").write_text(table("date,clock,v", stamps("%Y-%m-%d"), cells, VALUES))
+    with refused("'2024-03-01 99:59:59' at line 32", "--drop-bad"):
+        read_source(tmp_path / "a.csv")
+
+
+def test_keys_that_look_like_hours_tell_series_apart():
+    frame = pd.DataFrame({"date": TIMES.strftime("%Y-%m-%d"), "age": ["18-24", "25-34"] * 30})
+    frame["date"] = pd.date_range("2024", periods=30).repeat(2).strftime("%Y-%m-%d")
+    assert list(read_source(frame.assign(v=VALUES))) == ["18-24", "25-34"]
+
+
 def test_lines_that_repeat_the_names_leave_no_gap(tmp_path):
     (tmp_path / "a.csv").write_text("a,b\n1.5,2\n2.5,x\na,b\n4.5,5\n5.5,y\n")
     channels = read_source(tmp_path / "a.csv")
@@ -704,9 +751,9 @@ def test_numbers_that_turn_hexadecimal_further_down_are_words(tmp_path, refused)
     (tmp_path / "a.csv").write_text(table("time,code,v", range(396), cells, range(396)))
     assert list(read_source(tmp_path / "a.csv")) == ["v"]
     (tmp_path / "a.csv").write_text(
-        table("time,code,v", range(301), [*cells[:300], "BD"], range(301))
+        table("time,code,v", range(301), [*cells[:300], "5A"], range(301))
     )
-    with refused("'BD' at line 302"):
+    with refused("'5A' at line 302"):
         clean(read_source(tmp_path / "a.csv")["code"])
 
 

@@ -1,5 +1,7 @@
 """Times in forms that only a rule tells apart, each worked by hand."""
 
+import contextlib
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -84,7 +86,6 @@ def test_a_step_back_by_a_day_or_an_hour_is_refused_unless_a_zone_is_known(refus
     [
         ([*range(60), *range(20, 80)], 60, "cover the same time once more"),
         ([minute for _ in range(6) for minute in range(20)], 20, "cover the same time once more"),
-        ([600, 660, 720, 60, 120, 180, 240], 3, "hours from 1 to 12"),
     ],
 )
 @pytest.mark.parametrize("has_zone", [False, True])
@@ -93,6 +94,16 @@ def test_dates_that_begin_again_are_refused(refused, minutes, row, words, has_zo
     times = 60 * 10**9 * np.array(minutes)[::order]
     with refused(f"row {row} of volts", words):
         refuse_steps_back(times, np.arange(len(minutes))[::order], Log(), "volts", has_zone)
+
+
+def test_hours_from_1_to_12_are_refused_and_blocks_in_another_order_are_not(refused):
+    for hours, is_refused in (
+        ([10, 11, 12, 1, 2, 3, 4], True),
+        ([12, 14, 16, 18, 6, 8, 10], False),
+    ):
+        times = 3_600 * 10**9 * np.array(hours)
+        with refused("hours from 1 to 12") if is_refused else contextlib.nullcontext():
+            refuse_steps_back(times, np.arange(7), Log(), "volts", has_zone=False)
 
 
 def test_what_fills_a_gap_late_is_no_clock_that_was_set():

@@ -160,9 +160,10 @@ def _rows_with_times(
     if (np.diff(times[has_time]) <= 0).any():
         # rows that are there twice, as where exports overlap, do no harm
         twice = pd.DataFrame({"time": times, "value": values}).duplicated()
-        rows = np.flatnonzero(has_time & ~twice)
+        rows = np.flatnonzero(has_time & ~twice & np.isfinite(values))
         is_told = not local or options.timezone is not None
-        refuse_steps_back(times[rows], rows, log, raw.name, is_told)
+        if counts or not is_told or options.same_time != "last":  # which corrects earlier rows
+            refuse_steps_back(times[rows], rows, log, raw.name, is_told)
     if local:
         zone = f"{options.timezone or 'UTC'}, as none is stated"
     elif options.timezone and zone != "none":

@@ -7,7 +7,6 @@ names its place or is marked, so that the caller can count it.
 
 import dataclasses
 import datetime
-import itertools
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -51,7 +50,7 @@ _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 226
 DURATION = (
     r"[+-]?\d+(?:\.\d+)? ?"
     r"(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
-    r"|P(?:\d+D)?T\d[\d.HMS]*[HMS]|P\d+D"
+    r"|P(?:\d+D)?T(?=\d)(?:\d+H)?(?:\d+M)?(?:\d+(?:\.\d+)?S)?|P\d+D"
 )
 """Pattern of a time span as text, such as `0.5 sec`, `1 days 00:00:01` and `PT90S`."""
 _ISO = "ISO8601"
@@ -221,6 +220,9 @@ class _Reader:
                 return self.of_dates(
                     pd.Series(pd.to_datetime(text, utc=bool(aware), errors="coerce"))
                 )
+            if len(given) and given.map(lambda cell: isinstance(cell, datetime.timedelta)).all():
+                spans = pd.to_timedelta(text, errors="coerce")
+                return self.of_numbers(spans.dt.total_seconds(), "s")
             text = text.map(
                 lambda cell: (
                     str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None
@@ -391,13 +393,13 @@ def epoch_unit(size: float) -> str | None:
 
 
 def are_spans(text: pd.Series) -> bool:
-    """Whether text without missing cells is time spans, or times of day of which some are beyond
-    24 h, as elapsed ones are.
+    """Whether text without missing cells is time spans, or times of day that begin or end beyond
+    24 h, as elapsed ones do.
     """
     head = text.iloc[:LOOK]
     if not head.str.fullmatch(TIME_OF_DAY).mean() > 0.5:
         return bool(head.str.fullmatch(DURATION).mean() > 0.5)
-    return bool(text.str.fullmatch(_ELAPSED).any())
+    return bool(text.iloc[[0, -1]].str.fullmatch(_ELAPSED).any())
 
 
 def date_forms(text: pd.Series) -> list[str]:
@@ -574,7 +576,11 @@ def refuse_steps_back(
             how = "state no zone and step back by one day, as where a date stays past midnight"
             options += counting
             otherwise = ""
-        elif are(12 * hour):
+        elif (
+            are(12 * hour)
+            and not has_zone
+            and pd.DatetimeIndex(times).hour.isin(range(1, 13)).all()
+        ):
             how = "step back by half a day, as hours from 1 to 12 do"
             options = counting
             otherwise = "times with AM or PM"
@@ -583,6 +589,7 @@ def refuse_steps_back(
             how = "go back and cover the same time once more, as where a clock was set"
             options = counting
             otherwise = "the parts one by one"
+            otherwise += ", or same_time='last' if rows correct earlier ones" if has_zone else ""
     if len(back):
         raise InputError(
             f"Expected ascending times. Received: times that {how}, at "
@@ -602,9 +609,11 @@ def jumps_back(times: np.ndarray) -> list[int]:
         return []
     again = []
     longest = 3 * np.median(np.abs(steps))
-    for jump, end in itertools.pairwise([*jumps, len(times) - 1]):
+    before = times[:0]
+    for first, jump, end in zip([-1, *jumps], jumps, [*jumps[1:], len(times) - 1], strict=False):
         run = times[jump + 1 : end + 1]
-        before = np.sort(times[: jump + 1])
+        # the earlier ones are in order already, so that this takes little time
+        before = np.sort(np.concatenate([before, times[first + 1 : jump + 1]]), kind="stable")
         place = np.searchsorted(before, run, "right")
         inside = (place > 0) & (place < len(before))
         # a gap that is filled late was not shown before

@@ -7,7 +7,7 @@ only look like a clock are never taken.
 import itertools
 import re
 import zoneinfo
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, NoReturn
 
 import numpy as np
@@ -66,9 +66,10 @@ _PARTS = {
 } | {unit: _UNITS[unit] for unit in ("ms", "us", "ns")}
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
 _FRACTIONS = {"ms": 999, "us": 999_999, "ns": 999_999_999}  # of a second, at most
-_MOST = {"hour": 24, "minute": 59, "second": 60} | _FRACTIONS  # of a time of day
+_MOST = {"hour": 24, "minute": 60, "second": 60} | _FRACTIONS  # of a time of day
 _STATISTICS = set("max maximum mean avg average".split())  # beside which `min` is no minute
 _CLOSE = 0.02  # by which fractions of a second may make the steps of a clock less alike
+_FEW = 0.05  # share of the rows in which a part of a time may be out of range
 _OFTEN = 0.3  # share of the rows that repeat a date, above which it lacks its time of day
 _ADDED = {"doy": "D", "hour": "h", "minute": "min", "second": "s", "ms": "ms"}
 _ADDED |= {"us": "us", "ns": "ns"}
@@ -81,7 +82,7 @@ _FACTOR = re.compile(
 _ZONE = re.compile(
     r"\b(?:[A-Z][a-z]+/[A-Z]\w+|CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b"
 )
-_TIME_LIKE = r"\s*\d\d? ?[:.hH-] ?\d\d\b.*"
+_TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(?!\d).*"
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
 _ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
 
@@ -127,6 +128,12 @@ def _seconds_of(spans: pd.Series) -> np.ndarray:
     return np.where(stamps.isna(), np.nan, stamps.as_unit("ns").asi8 / 1e9)
 
 
+def _may_count(values: np.ndarray) -> bool:
+    """Whether time spans never go back, but for a few that come late, or fall in equal steps."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(np.any(steps > 0) and np.mean(steps >= 0) >= 0.9) or is_regular(values[::-1])
+
+
 def _is_increasing(values: np.ndarray) -> bool:
     """Whether numbers increase nearly throughout; some may repeat, and a few may come late."""
     steps = np.diff(values[np.isfinite(values)])
@@ -164,7 +171,7 @@ def find_clock(
     of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "spans")}
     varying = _varying(of_kind["dates"], frame)
     dates = _without_ends(varying or of_kind["dates"][:1])
-    spans = [name for name in of_kind["spans"] if _is_increasing(_seconds_of(frame[name]))]
+    spans = [name for name in of_kind["spans"] if _may_count(_seconds_of(frame[name]))]
     spans.sort(key=lambda name: -tells[name])
     named = [name for name in numbers if tells[name] == 2]
     compact = [name for name in named if compact_form(numbers[name]) == "%Y%m%d"]
@@ -201,6 +208,8 @@ def find_clock(
     clocks = _without_ends([first, *others]) if first else []
     if clocks and compact and clocks != compact[:1]:
         _refuse_apart(compact[0], clocks[0], frame, what)
+    if clocks and dates and not is_epoch(numbers[clocks[0]]) and name_tells(clocks[0])[1] is None:
+        _refuse_apart(dates[0], clocks[0], frame, what, [{"time": clocks[0]}])
     if clocks or dates:
         return _one_of(clocks or dates, frame, what)
     for name, kind in kinds.items():
@@ -213,6 +222,7 @@ def find_clock(
             )
         if tells[name] == 2 and kind == "words":
             return Clock((name,), frame[name])  # to be refused with its first cell
+    named += [name for name in of_kind["spans"] if tells[name] == 2]
     if named:
         raise InputError(
             f"Expected a clock that increases. Received: {named[0]!r} of {what}, which is named "
@@ -247,12 +257,14 @@ def _refuse_apart_times(
             _refuse_apart(day, name, frame, what)
 
 
-def _refuse_apart(day: str, time: str, frame: pd.DataFrame, what: str) -> NoReturn:
+def _refuse_apart(
+    day: str, time: str, frame: pd.DataFrame, what: str, options: Sequence[dict[str, str]] = ()
+) -> NoReturn:
     cells = ", ".join(format_cell(frame[name].iloc[0]) for name in (day, time))
     raise InputError(
         f"Expected a date and its time of day in one column. Received: {day!r} and {time!r} "
         f"({cells}) in {what}.",
-        [_COUNT],
+        [*options, _COUNT],
         "both in one column, as 2024-03-01T12:00:00",
     )
 
@@ -326,7 +338,8 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
         return None
     name = clock.columns[0]
     factor = _FACTOR.search(f"{name} [{units.get(name, '').strip('[]() ')}]")
-    if factor and factor[1] != "1" and pd.api.types.is_numeric_dtype(clock.cells.dtype):
+    is_one = factor and re.fullmatch(r"0+|1(?:\.0*)?|24", factor[1])
+    if factor and not is_one and pd.api.types.is_numeric_dtype(clock.cells.dtype):
         raise InputError(
             f"Expected times in s, ms, us or ns. Received: a multiple of a unit in {name!r} of "
             f"{what}.",
@@ -572,12 +585,14 @@ def _joined(
     below = {part: name for part, name in parts.items() if part in _FRACTIONS}
     if hours and is_day:
         lacks = frame[hours[0]].dropna().iloc[:LOOK].astype("str").str.fullmatch(r" *\d\d?:\d\d *")
-        seconds = {"second": parts["second"]} if lacks.all() and "second" in parts else {}
-        parts = seconds | below
+        has_seconds = "second" in parts and np.nanmax(numbers[parts["second"]]) <= _MOST["second"]
+        parts = ({"second": parts["second"]} if lacks.all() and has_seconds else {}) | below
     elif not is_day and below and whole_seconds:
         parts = below
     elif not is_day or "hour" not in parts:
         parts = {}
+    elif "second" not in parts:
+        parts = {part: name for part, name in parts.items() if part not in below}
     texts: list[str] = []
     if hours and is_day:
         texts = hours + [
@@ -592,16 +607,20 @@ def _joined(
         for name in texts:
             cells = cells + " " + frame[name].astype("str").str.strip()
     if parts and parts.keys() <= _FRACTIONS.keys():
-        stamps = parse_times(cells, "", drop=True).stamps
-        parts = parts if _makes_alike(stamps, _added(numbers, parts)) else {}
+        parts = parts if _makes_alike(cells, _added(numbers, parts)) else {}
     columns = (dates[0], *texts, *parts.values())
     return Clock(columns, cells, _added(numbers, parts)) if len(columns) > 1 else None
 
 
-def _makes_alike(stamps: pd.DatetimeIndex, added: pd.Series) -> bool:
+def _makes_alike(cells: pd.Series, added: pd.Series) -> bool:
     """Whether fractions of a second are those of a clock: they are the same throughout, or go
-    through a tenth of a second or more, and its steps do not become less alike by them.
+    through a tenth of a second or more, unless its dates repeat, and its steps do not become less
+    alike by them.
     """
+    try:
+        stamps = parse_times(cells, "", drop=True).stamps
+    except InputError:  # which is said when the clock is read
+        return True
 
     def spread(times: pd.DatetimeIndex) -> float:
         steps = np.diff(times.dropna().as_unit("ns").asi8)
@@ -612,7 +631,8 @@ def _makes_alike(stamps: pd.DatetimeIndex, added: pd.Series) -> bool:
     if added.nunique() == 1:
         return added.iloc[0] == pd.Timedelta(0) or added.iloc[0] >= pd.Timedelta("1ms")
     is_wide = added.max() - added.min() >= pd.Timedelta("100ms")
-    return is_wide and spread(both) <= spread(stamps) + _CLOSE
+    before = spread(stamps)
+    return (is_wide or before == np.inf) and spread(both) <= before + _CLOSE
 
 
 def _are_days(cells: pd.Series) -> bool:
@@ -636,24 +656,28 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
             part = "minute"
         if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
             found.setdefault(part, name)
-    if "hour" not in found:  # minutes of no hour; seconds are those of a day
-        found.pop("minute", None)
-    most = _MOST if "hour" in found else _MOST | {"second": 86_400}
+    most = dict(_MOST)
+    if "hour" not in found:  # of a day
+        most |= {"minute": 1_439, "second": 86_400}
+        if "second" in found or not plain.get(found.get("minute"), "").startswith("minute"):
+            found.pop("minute", None)
     for part in found.keys() & most.keys():
-        values = numbers[found[part]][np.isfinite(numbers[found[part]])]
-        is_whole = part in ("hour", "second") or (values % 1 == 0).all()
-        if not is_whole or not ((values >= 0) & (values <= most[part])).all():
+        values = numbers[found[part]]
+        is_whole = part in ("hour", "second") or (values[np.isfinite(values)] % 1 == 0).all()
+        if not is_whole or np.mean((values > most[part]) | (values < 0)) > _FEW:
             del found[part]
     return found
 
 
 def _added(numbers: Mapping[str, np.ndarray], parts: Mapping[str, str]) -> pd.Series | None:
     """Returns the sum of the parts of a time of day, and of days of a year; None without any."""
-    spans = [
-        pd.Series(pd.to_timedelta(numbers[parts[part]] - (part == "doy"), unit=unit))
-        for part, unit in _ADDED.items()
-        if part in parts
-    ]
+    most = _MOST if "hour" in parts else _MOST | {"minute": 1_439, "second": 86_400}
+    spans = []
+    for part, unit in _ADDED.items():
+        if part in parts:
+            values = numbers[parts[part]] - (part == "doy")
+            is_known = (values >= 0) & (values <= most.get(part, np.inf))  # others have no time
+            spans.append(pd.Series(pd.to_timedelta(np.where(is_known, values, np.nan), unit=unit)))
     unit = "ns" if "ns" in parts else "us"
     return sum(spans[1:], spans[0]).dt.round(unit) if spans else None
 

@@ -60,6 +60,7 @@ _LABELLED = {"severity", "onset", "end", "mask"}
 _WRITTEN = (_LABELLED, {"value", "score", "flag"}, {"copy", "value", "out_of_range"})
 # what these have beside the values
 _OWN = _LABELLED.union("scenario enhanced score score_after flag out_of_range".split())
+_FEWEST_HEX = 3  # different cells with letters, below which they are damaged numbers
 _MAX_STATES = 10  # a label or flag has at most this many different values
 _OBJECTS = {
     "dates": datetime.date | np.datetime64,
@@ -273,7 +274,7 @@ def _turn_hex(head: pd.Series, cells: pd.Series) -> bool:
     text = cells.dropna().astype("str").str.strip()
     mixed = text[text.str.fullmatch(r"(?=.*\d)[\dA-Fa-f]*[A-Fa-f][\dA-Fa-f]*")]
     of_length = mixed[mixed.str.len() == len(head.iloc[0])]
-    return not of_length.str.fullmatch(r"\d+[eE]\d+").all()
+    return of_length[~of_length.str.fullmatch(r"\d+[eE]\d+")].nunique() >= _FEWEST_HEX
 
 
 def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:

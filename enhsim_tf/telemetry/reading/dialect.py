@@ -222,14 +222,12 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
         # the line of the most different names, of several the first
         header = max(range(block, top), key=lambda number: len({*rows[number]} - {""}))
         given = rows[header]
-        # a date and a time of day below one name; row names of R, which have none
-        if 1 < len(given) == width - 1 and (
-            mark == BLANKS
-            and ":" in rows[begin][1]
-            or [cell.strip('"') for row in rows[begin : begin + 3] for cell in row[:1]]
-            == ["1", "2", "3"]
-        ):
+        # a date and a time of day below one name
+        if mark == BLANKS and 1 < len(given) == width - 1 and ":" in rows[begin][1]:
             given = ["", *given]
+        # R writes quoted names, and none above the numbers of the rows
+        if mark == BLANKS and len(given) == width - 1 and rows[begin][0] == '"1"':
+            given = ["", *(cell.strip('"') for cell in given)]
         if any(any(row[len(given) :]) for row in sample):
             return None
         names = given + names[len(given) :]

@@ -97,6 +97,8 @@ def _is_json(text: str) -> bool:
 
 def _frame_of(records: Sequence[Any]) -> pd.DataFrame:
     """Makes a table of records, or of lists of one length, of which the first may hold names."""
+    if not isinstance(records, list):
+        raise ValueError("neither records nor lists")
     if not records or not all(isinstance(record, list) for record in records):
         return pd.json_normalize(records)
     if len(lengths := {len(record) for record in records}) > 1:
@@ -118,11 +120,12 @@ def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str
             lists |= _lists_of(value, inside)
         elif isinstance(value, list) and value:
             is_records = isinstance(value[0], dict)
-            if isinstance(value[0], list):
-                refuse_channels_first((len(value), len(value[0])), inside)
             frame = pd.json_normalize(value) if is_records else pd.DataFrame(value)
             cells = frame[[column for column in frame if frame[column].dtype == object]]
             if cells.map(lambda cell: isinstance(cell, list | dict)).any(axis=None):
+                continue
+            if frame.shape[1] >= 10 * len(frame) > 10:  # which is refused as channels first
+                lists[group, key] = frame.to_numpy()
                 continue
             for name, column in frame.items():
                 names = (group, key if frame.shape[1] == 1 else f"{key}.{name}")

@@ -304,7 +304,9 @@ def _repeated_headers(
     if not is_text(first):
         return []
     first = first.astype("str")
-    found = np.flatnonzero((first.str.startswith("$RT_") | first.isin(names)).fillna(False))
+    second = frame.iloc[:, (place + 1) % len(names)].astype("str")
+    is_header = (first == names[place]) | first.isin(names) & second.isin(names)
+    found = np.flatnonzero((first.str.startswith("$RT_") | is_header).fillna(False))
     rows = []
     for row in found.tolist():
         cells = [str(cell).strip() for cell in frame.iloc[row]]
