@@ -152,19 +152,19 @@ def _read_array(
         )
     if array.dtype == bool and options.states:
         array = array.astype(np.float64)
-    may_be_table = columns is None and time is None and array.shape[1] > 1
-    if may_be_table and array.dtype.kind in "fiu" and is_regular(array[:, 0]):
+    known = {str(number): number for number in range(array.shape[1])}
+    last = array.shape[1] - 1
+    found = {}
+    has_layout = array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array) > 0
+    has_commands = columns is None and has_layout and np.isin(array[:, 1:], (0, 1)).all()
+    may_be_table = array.shape[1] > 1 and array.dtype.kind in "fiu" and not has_commands
+    if columns is None and time is None and may_be_table and is_regular(array[:, 0]):
         raise InputError(
             f"Expected channels without a clock. Received: column 0 of {path.name}, which "
             "increases in equal steps, as a clock does.",
             [{"columns": [str(number) for number in range(1, array.shape[1])]}, {"time": NO_TIME}],
             "a table with names",
         )
-    known = {str(number): number for number in range(array.shape[1])}
-    last = array.shape[1] - 1
-    found = {}
-    has_layout = array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array) > 0
-    has_commands = columns is None and has_layout and np.isin(array[:, 1:], (0, 1)).all()
     for column in ["0"] if has_commands else columns or known:
         if column not in known:
             raise InputError(

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.sources import read_source
 
 LABELS = "labeled_anomalies.csv"
@@ -118,7 +119,7 @@ def load_channel(
 
 def _read(folder: Path, channel: str) -> np.ndarray:
     path = folder / f"{channel}.npy"
-    values = next(iter(read_source(path).values())).cells.to_numpy(np.float32)
+    values = next(iter(read_source(path, time=NO_TIME).values())).cells.to_numpy(np.float32)
     if not np.isfinite(values).all():
         raise InputError(
             f"Expected finite values. Received: NaN or infinity in {path}. Clean it and save it "

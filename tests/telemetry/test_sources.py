@@ -87,6 +87,10 @@ def test_commands_are_no_channels_unless_they_are_named(tmp_path):
     np.save(tmp_path / "a.npy", np.column_stack([VALUES, sent]))
     assert list(read_source(tmp_path / "a.npy")) == ["a.0"]
     assert list(read_source(tmp_path / "a.npy", ["0", "3"])) == ["a.0", "a.3"]
+    np.save(tmp_path / "c.npy", np.column_stack([np.arange(len(VALUES)), VALUES]))
+    with pytest.raises(InputError, match="--column 1, or --time none"):
+        read_source(tmp_path / "c.npy")
+    assert list(read_source(tmp_path / "c.npy", time="none")) == ["c.0", "c.1"]
     np.save(tmp_path / "b.npy", np.column_stack([VALUES, 2 * sent]))
     assert len(read_source(tmp_path / "b.npy")) == 25
 
