@@ -247,8 +247,8 @@ def _refuse_apart_times(
         if name in numbers and name_tells(name)[0] == 2:
             values = numbers[name][np.isfinite(numbers[name])]
             is_apart = name_tells(name)[1] is None and may_be_time_of_day(values)
-            is_finer = frame[day].nunique() > 1 and (np.diff(values) > 0).all()
-            if is_finer and not is_apart:
+            is_finer = (np.diff(values) > 0).all() and frame[day].nunique() > 1
+            if not is_apart and is_finer:
                 _one_of([day, name], frame, what)
         else:
             cells = frame[name].dropna().iloc[:LOOK].astype("str")
@@ -606,10 +606,11 @@ def _joined(
         cells = cells.astype("str").str.strip().ffill()
         for name in texts:
             cells = cells + " " + frame[name].astype("str").str.strip()
-    if parts and parts.keys() <= _FRACTIONS.keys():
-        parts = parts if _makes_alike(cells, _added(numbers, parts)) else {}
+    added = _added(numbers, parts)
+    if parts and parts.keys() <= _FRACTIONS.keys() and not _makes_alike(cells, added):
+        parts, added = {}, None
     columns = (dates[0], *texts, *parts.values())
-    return Clock(columns, cells, _added(numbers, parts)) if len(columns) > 1 else None
+    return Clock(columns, cells, added) if len(columns) > 1 else None
 
 
 def _makes_alike(cells: pd.Series, added: pd.Series) -> bool:
@@ -627,9 +628,9 @@ def _makes_alike(cells: pd.Series, added: pd.Series) -> bool:
         usual = np.median(steps) if len(steps) else 0
         return float(np.mean(np.abs(steps / usual - 1))) if usual > 0 else np.inf
 
-    both = stamps + pd.TimedeltaIndex(added)
     if added.nunique() == 1:
         return added.iloc[0] == pd.Timedelta(0) or added.iloc[0] >= pd.Timedelta("1ms")
+    both = stamps + pd.TimedeltaIndex(added)
     is_wide = added.max() - added.min() >= pd.Timedelta("100ms")
     before = spread(stamps)
     return (is_wide or before == np.inf) and spread(both) <= before + _CLOSE
@@ -656,11 +657,11 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
             part = "minute"
         if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
             found.setdefault(part, name)
-    most = dict(_MOST)
-    if "hour" not in found:  # of a day
-        most |= {"minute": 1_439, "second": 86_400}
-        if "second" in found or not plain.get(found.get("minute"), "").startswith("minute"):
-            found.pop("minute", None)
+    if "hour" not in found and (
+        "second" in found or not plain.get(found.get("minute"), "").startswith("minute")
+    ):
+        found.pop("minute", None)
+    most = _most_of(found)
     for part in found.keys() & most.keys():
         values = numbers[found[part]]
         is_whole = part in ("hour", "second") or (values[np.isfinite(values)] % 1 == 0).all()
@@ -669,9 +670,16 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
     return found
 
 
+def _most_of(parts: Mapping[str, str]) -> Mapping[str, int]:
+    """Returns the largest values of parts of a time; minutes and seconds without hours are those of
+    a day.
+    """
+    return _MOST if "hour" in parts else _MOST | {"minute": 1_439, "second": 86_400}
+
+
 def _added(numbers: Mapping[str, np.ndarray], parts: Mapping[str, str]) -> pd.Series | None:
     """Returns the sum of the parts of a time of day, and of days of a year; None without any."""
-    most = _MOST if "hour" in parts else _MOST | {"minute": 1_439, "second": 86_400}
+    most = _most_of(parts)
     spans = []
     for part, unit in _ADDED.items():
         if part in parts:

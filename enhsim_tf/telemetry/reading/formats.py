@@ -56,16 +56,13 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
     """
     with reading(name):
         text = content.decode("utf-8-sig").strip()
-        is_whole = text.startswith("[") or _is_json(text)
-        lines = [text] if is_whole else [line for line in text.splitlines() if line.strip()]
-        records = [json.loads(line) for line in lines[:-1]]
-        findings = []
+        findings: list[Finding] = []
         try:
-            records += [json.loads(line) for line in lines[-1:]]
+            records, is_whole = [json.loads(text)], True
         except json.JSONDecodeError:
-            if not records or content.endswith(b"\n"):
+            if text.startswith("["):
                 raise
-            findings = [Finding("ragged lines", 1, "the last line is cut off and left out")]
+            records, is_whole = _lines_of(text, content.endswith(b"\n"), findings), False
     if len(records) == 1 and isinstance(records[0], dict):
         with reading(name):
             lists = _lists_of(records[0])
@@ -87,12 +84,17 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
     return Table(frame, findings=tuple(findings))
 
 
-def _is_json(text: str) -> bool:
+def _lines_of(text: str, is_ended: bool, findings: list[Finding]) -> list[Any]:
+    """Returns the values of JSON lines, of which the last may be cut off if it does not end."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    values = [json.loads(line) for line in lines[:-1]]
     try:
-        json.loads(text)
+        values += [json.loads(line) for line in lines[-1:]]
     except json.JSONDecodeError:
-        return False
-    return True
+        if not values or is_ended:
+            raise
+        findings.append(Finding("ragged lines", 1, "the last line is cut off and left out"))
+    return values
 
 
 def _frame_of(records: Sequence[Any]) -> pd.DataFrame:
@@ -282,12 +284,11 @@ def _of_arrays(
         if group and lengths.count(group) == 1
         else f"{group}/{first}"
         if group and firsts.count(first) > 1
-        else first: columns
+        else first: (group, columns)
         for ((group, _), columns), first in zip(tables.items(), firsts, strict=True)
     }
-    title = chosen_table(named, name, options)
-    frame = pd.DataFrame({key: pd.Series(values) for key, values in named[title].items()})
-    group = next(group for (group, _), columns in tables.items() if columns is named[title])
+    group, chosen = named[chosen_table(named, name, options)]
+    frame = pd.DataFrame({key: pd.Series(values) for key, values in chosen.items()})
     stated = {key: (units or {}).get(f"{group}/{key}".strip("/"), "") for key in frame}
     return Table(frame, units=stated)
 
