@@ -4,7 +4,9 @@ Values are returned as they are in the source, and times are parsed but neither 
 that is done by `cleaning`. Findings made while reading become part of the cleaning report.
 """
 
+import io
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from enhsim_tf.telemetry.influx_store import InfluxStore
 from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.reading.channels import Channels, read_table_channels
 from enhsim_tf.telemetry.reading.clock import NO_TIME, is_regular
+from enhsim_tf.telemetry.reading.files import suffix_of, unpack
 from enhsim_tf.telemetry.reading.formats import refuse_channels_first
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.source_kinds import existing
@@ -66,7 +69,7 @@ def read_source(
         source = existing(source)
     if isinstance(source, str):
         return _read_influx(source, columns, time, options)
-    if isinstance(source, Path) and source.suffix.lower() == ".npy" and not source.is_dir():
+    if isinstance(source, Path) and suffix_of(source) == ".npy" and not source.is_dir():
         return _read_array(source, columns, time, options)
     return read_table_channels(source, columns, time, options)
 
@@ -131,7 +134,8 @@ def _read_array(
             "out."
         )
     with reading(path.name):
-        array = np.load(path, allow_pickle=False)  # unpickling could run code
+        # unpickling could run code
+        array = np.load(io.BytesIO(unpack(path)[0]), allow_pickle=False)
     if not isinstance(array, np.ndarray) or array.dtype.kind in "SUV":
         raise InputError(
             f"Expected a NumPy array of numbers. Received: an archive, text or records in "
@@ -152,6 +156,7 @@ def _read_array(
         )
     if array.dtype == bool and options.states:
         array = array.astype(np.float64)
+    stem = re.split(r"\.npy", path.name, flags=re.IGNORECASE)[0]
     known = {str(number): number for number in range(array.shape[1])}
     last = array.shape[1] - 1
     found = {}
@@ -171,7 +176,7 @@ def _read_array(
                 f"Expected a column of {path.name}, a number from 0 to {last}. Received: "
                 f"{column!r}. Name one of these."
             )
-        name = path.stem if last == 0 else f"{path.stem}.{column}"
+        name = stem if last == 0 else f"{stem}.{column}"
         findings = ()
         if has_commands:
             text = (

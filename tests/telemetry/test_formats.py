@@ -208,6 +208,11 @@ def test_files_of_other_units_or_zones_are_not_joined(tmp_path, refused):
     times = pd.date_range("2024", periods=N, freq="s")
     for name, zone in (("a", "UTC"), ("b", None)):
         FRAME.assign(time=times.tz_localize(zone)).to_parquet(tmp_path / f"{name}.parquet")
+    for ending, factor in (("c", 1), ("d", 1_000)):
+        since = 1_709_251_200 + np.arange(N)
+        FRAME.assign(time=factor * since).to_parquet(tmp_path / f"{ending}.parquet")
+    with refused("'time' of different units"):
+        read_telemetry([tmp_path / "c.parquet", tmp_path / "d.parquet"])
     for ending in ("h5", "parquet"):
         with refused("'time' of different units", f"a.{ending} to b.{ending}"):
             read_telemetry([tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"])
@@ -255,6 +260,40 @@ def test_lists_of_values_are_rows(tmp_path, refused):
     (tmp_path / "a.json").write_text(json.dumps([*rows, [40.0, 1.0]]))
     with refused("lists of 2 to 3 values"):
         read_telemetry(tmp_path / "a.json")
+
+
+def test_columns_inside_of_one_json_record_are_a_table(tmp_path):
+    FRAME.to_json(tmp_path / "a.json")
+    (telemetry,) = read_telemetry(tmp_path / "a.json")
+    np.testing.assert_allclose(telemetry.values, FRAME[["volts", "amps"]], rtol=1e-6)
+
+
+def test_a_zone_beside_lists_of_json_is_asked_for(tmp_path, refused):
+    times = pd.date_range("2024-03-01", periods=N, freq="h").strftime("%Y-%m-%dT%H:%M").tolist()
+    record = {"timezone": "Asia/Tokyo", "hourly": {"time": times, "volts": VALUES.tolist()}}
+    (tmp_path / "a.json").write_text(json.dumps(record))
+    with refused("--timezone Asia/Tokyo"):
+        read_telemetry(tmp_path / "a.json")
+    (telemetry,) = read_telemetry(tmp_path / "a.json", Cleaning(timezone="Asia/Tokyo"))
+    assert telemetry.start == "2024-02-29T15:00:00+00:00"
+
+
+def test_texts_of_matlab_7_3_are_times(tmp_path):
+    times = pd.date_range("2024-03-01", periods=N, freq="min").strftime("%Y-%m-%d %H:%M:%S")
+    matlab_7_3(tmp_path / "a.mat")
+    with h5py.File(tmp_path / "a.mat", "r+") as file:
+        del file["time"]
+        file["time"] = np.array([list(map(ord, text)) for text in times], np.uint16).T
+        file["time"].attrs["MATLAB_class"] = np.bytes_("char")
+    (telemetry,) = read_telemetry(tmp_path / "a.mat")
+    assert (telemetry.start, telemetry.interval_s) == ("2024-03-01T00:00:00+00:00", 60)
+
+
+def test_complex_arrays_and_those_of_three_dimensions_are_left_out_with_a_word(tmp_path):
+    others = {"z": 1j * VALUES, "cube": np.ones((N, 2, 3))}
+    scipy.io.savemat(tmp_path / "a.mat", {"volts": VALUES} | others)
+    (series,) = read_source(tmp_path / "a.mat").values()
+    assert clean(series).report.find("columns left out").text.endswith("z, cube")
 
 
 def test_lists_inside_of_one_json_record_are_a_table(tmp_path):

@@ -669,6 +669,20 @@ REFUSED = {
         table("time,v", SECONDS, [f"{value} {'V' if value > 16 else 'mV'}" for value in VALUES]),
         f"mV' at line {2 + np.argmax(VALUES <= 16)}",
     ),
+    "a number and a flag in one cell": (
+        table("time,v", UTC, [f'"{round(100 * value)},{k % 2}"' for k, value in enumerate(VALUES)]),
+        "values and flags in columns of their own",
+    ),
+    "a zone beside the table": (
+        table("time,v", MINUTES, VALUES, above="zone\nEurope/Berlin\n\n"),
+        "--timezone Europe/Berlin",
+        {"options": Cleaning(timezone="Europe/Berlin")},
+        60,
+    ),
+    "an index without a name that varies": (
+        table(",v", SECONDS + 20 * np.sin(np.arange(N)).round(2), VALUES),
+        "--time 'column 0'",
+    ),
     "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), "v.1, v.2"),
     "numbered sensors": (
         table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)),
@@ -1204,6 +1218,35 @@ def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused)
     (tmp_path / "amps.csv").write_text("".join(PLAIN.splitlines(keepends=True)[:20]))
     with refused("amps.csv and volts.csv over the same times"):
         read_source(tmp_path)
+
+
+def test_tables_in_csv_and_parquet_are_no_parts_of_one_series(tmp_path, refused):
+    (tmp_path / "a.csv").write_text(PLAIN)
+    pd.read_csv(tmp_path / "a.csv").to_parquet(tmp_path / "b.parquet")
+    with refused("a.csv and b.parquet"):
+        read_source(tmp_path)
+
+
+def test_series_of_words_beside_series_of_numbers_are_left_out():
+    frame = pd.DataFrame({"id": ["a", "b"] * N, "time": TIMES.repeat(2)})
+    frame["value"] = [word for value in VALUES for word in (str(value), "on")]
+    channels = read_source(frame)
+    assert list(channels) == ["a"]
+    assert "series without numbers: b" in check(channels["a"]).find("columns left out").text
+
+
+def test_hours_that_end_are_those_of_a_day_beside_its_date(tmp_path):
+    times = pd.date_range(START, periods=N, freq="h")
+    ends = [times.strftime("%Y-%m-%d"), times.hour + 1]
+    (tmp_path / "a.csv").write_text(table("Date,Hour Ending,v", *ends, VALUES))
+    check(only(read_source(tmp_path / "a.csv")), start=START + pd.Timedelta("1h"), interval_s=3600)
+
+
+def test_names_may_be_numbers_behind_that_of_the_clock(tmp_path):
+    (tmp_path / "a.csv").write_text(table("time,31.5,63", UTC, VALUES, 2 * VALUES))
+    channels = read_source(tmp_path / "a.csv")
+    assert list(channels) == ["31.5", "63"]
+    check(channels["63"], 2 * VALUES)
 
 
 def test_rows_without_the_word_of_others_are_a_series():

@@ -1,5 +1,7 @@
 """Tests of reading raw channels from every kind of source, and of invalid sources."""
 
+import gzip
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -79,6 +81,12 @@ def test_channels_without_time(tmp_path):
         "a blank line is a row"
     )
     assert clean(channels["b"]).report.find("missing values").count == 2
+
+
+def test_a_packed_array_is_read(tmp_path):
+    np.save(tmp_path / "a.npy", VALUES)
+    (tmp_path / "a.npy.gz").write_bytes(gzip.compress((tmp_path / "a.npy").read_bytes()))
+    assert read_source(tmp_path / "a.npy.gz")["a"].cells.tolist() == VALUES.tolist()
 
 
 def test_commands_are_no_channels_unless_they_are_named(tmp_path):

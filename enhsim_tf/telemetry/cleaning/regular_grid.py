@@ -251,7 +251,8 @@ def _drop_duplicate_times(
             [{"interval_s": float(f"{np.median(np.diff(kept['time'])) / 1e9:.6g}")}]
             if len(kept) > 1
             else (),
-            "--series-column with the column that tells series apart",
+            "--series-column with the column that tells series apart, or dates with their time of "
+            "day as 2024-03-01T12:00:00",
         )
     text = (
         f"rows with another value at the same time, of which the {options.same_time} was taken: "

@@ -105,7 +105,7 @@ def parse_times(
     times = as_column(times, what)
     reader = _Reader(what, drop, places)
     if isinstance(times.dtype, pd.PeriodDtype):
-        times = times.astype(str).where(times.notna()) if len(times) else times.astype(object)
+        times = times.dt.start_time
     kind = times.dtype
     is_format = form is not None and "%" in form
     if pd.api.types.is_datetime64_any_dtype(kind):

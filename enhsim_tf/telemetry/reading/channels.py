@@ -13,7 +13,12 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.read_errors import MAX_COLUMNS
-from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_missing, is_text
+from enhsim_tf.telemetry.cleaning.numbers import (
+    format_cell,
+    is_missing,
+    is_text,
+    parse_numbers,
+)
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
@@ -106,6 +111,11 @@ def read_table_channels(
         chosen = _name_series(
             table.frame, keys, [name for name in layout.channels if name not in keys], what
         )
+        empty = [name for name, place in chosen.items() if not _has_numbers(table, *place)]
+        if columns is None and empty:
+            chosen = {name: place for name, place in chosen.items() if name not in empty}
+            text = f"series without numbers: {', '.join(empty[:8])}"
+            findings.append(Finding("columns left out", len(empty), text))
         text = (
             f"series told apart by {', '.join(keys)}: {len(chosen):,} "
             f"({', '.join(list(chosen)[:6])})"
@@ -128,16 +138,22 @@ def read_table_channels(
         )
         has_states = any(_is_state(table.frame[name]) for name in layout.words)
         pairs = "only numbers below a line of names, with commas between them"
+        other = "one number in each cell; a workbook needs the saved values of its formulas"
         raise InputError(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
             [{"states": True}] if has_states and not options.states else (),
-            pairs if _PAIR.search(left) else "another table",
+            pairs if _PAIR.search(left) else other,
         )
     channels = {
         name: _channel(table, layout, name, *place, findings, options)
         for name, place in chosen.items()
     }
     return Channels(channels, table.frame)
+
+
+def _has_numbers(table: Table, column: str, rows: np.ndarray) -> bool:
+    cells = table.frame[column].iloc[rows].drop_duplicates()
+    return bool(np.isfinite(parse_numbers(cells, "", drop=True, decimal=table.decimal)[0]).any())
 
 
 def _is_state(cells: pd.Series) -> bool:
@@ -379,7 +395,8 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
                 "Expected one row for each time. Received: times that repeat, with different "
                 f"values of {name!r}, in {what}.",
                 [{"series_column": name}],
-                "an interval with --interval to take their mean",
+                "a time of day in one column with its date, or an interval with --interval to take "
+                "their mean",
             )
 
 

@@ -33,7 +33,7 @@ _TIMES = set(
     "utc utcg ts clock mjd jd datenum uptime "
     "seconds secs millis milliseconds microseconds nanoseconds minutes hours days zeit zeitstempel "
     "zeitpunkt datum uhrzeit sekunden "
-    "temps heure horodatage tiempo fecha hora tempo tijd".split()
+    "temps heure horodatage tiempo fecha hora tempo tijd hhmm hhmmss".split()
 )
 _BESIDE = set(
     "since start of run the from local gmt cet sim simulation simulated mission rel relative abs "
@@ -60,7 +60,7 @@ _PARTS = {
     "month": "month mo mm monat",
     "day": "day dy dom dd tag",
     "doy": "doy dayofyear jday ddd",
-    "hour": "hour hr hh stunde",
+    "hour": "hour hr hh stunde hourending hourbeginning",
     "minute": "minute min mn",
     "second": "second sec ss sekunde sod secondofday",
 } | {unit: _UNITS[unit] for unit in ("ms", "us", "ns")}
@@ -79,9 +79,8 @@ _FACTOR = re.compile(
     rf"(?:[\[(]\s*x?|(?<!\d)/\s*|_)(\d[\d./^*-]*)[ *]*(?:{'|'.join(_UNIT_OF)})(?![^\W\d_])",
     re.IGNORECASE,
 )
-_ZONE = re.compile(
-    r"\b(?:[A-Z][a-z]+/[A-Z]\w+|CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b"
-)
+_PLACE = re.compile(r"\b[A-Z][a-z]+/[A-Z]\w+\b")  # as Europe/Berlin
+_ZONE = re.compile(r"\b(?:CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b")
 _TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(?!\d).*"
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
 _ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
@@ -95,6 +94,11 @@ class Clock(NamedTuple):
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
     added: pd.Series | None = None  # time spans
+
+
+def is_unnamed(name: str) -> bool:
+    """Whether a column has no name, as the index of a pandas object that was saved."""
+    return bool(re.fullmatch(r"column 0|Unnamed: \d+|level_0", name))
 
 
 def words_of(name: str) -> list[str]:
@@ -293,7 +297,14 @@ def _refuse_unknown(
         for name, each in numbers.items()
         if is_epoch(each) and np.ptp(each) > 0 <= np.diff(each).min()
     )
-    ramps = [name for name, values in numbers.items() if is_regular(values)]
+    ramps = [
+        name
+        for name, values in numbers.items()
+        if is_regular(values)
+        or is_unnamed(name)
+        and _is_increasing(values)
+        and np.nanmax(values % 1) > 0
+    ]
     groups = _signals_of(kinds, ramps)
     if not all(_is_nearly(numbers[ramps[0]], numbers[name]) for name in groups):
         raise InputError(
@@ -358,10 +369,10 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
 
 
 def offset_of(
-    clock: Clock, frame: pd.DataFrame, zone: str | None, what: str
+    clock: Clock, frame: pd.DataFrame, above: str, zone: str | None, what: str
 ) -> pd.Timedelta | None:
     """Returns the offset in a clock's name, as in `Time, GMT+02:00`, or None; refuses other
-    statements of a zone, unless `zone` is given.
+    statements of a zone, also in the text above the table, unless `zone` is given.
     """
     named = " ".join(clock.columns)
     if found := re.search(r"(?<!Etc/)\b(?:UTC|GMT) ?([+-]\d\d?)(?::?(\d\d))?\b", named):
@@ -371,15 +382,18 @@ def offset_of(
         for name in frame
         if _ZONE_COLUMN.search(name) or name.casefold() == "tz" and is_text(frame[name])
     ]
-    is_named = (found := _ZONE.search(named)) and (
-        "/" not in found[0] or found[0] in zoneinfo.available_timezones()
-    )
+    places = [
+        each
+        for each in _PLACE.findall(f"{named} {above}")
+        if each in zoneinfo.available_timezones()
+    ]
+    is_named = places or _ZONE.search(named)
     if zone is None and (is_named or beside and "utc" not in named.casefold()):
         raise InputError(
             "Expected times that state their zone. Received: "
-            f"{', '.join(dict.fromkeys([named, *beside]))} in {what}, where a zone is named "
-            "that is not read.",
-            [{"timezone": "UTC"}],
+            f"{', '.join(dict.fromkeys([named, *beside, *places]))} in {what}, where a zone is "
+            "named that is not read.",
+            [{"timezone": each} for each in dict.fromkeys((*places, "UTC"))],
             "the zone of the clock, as Europe/Berlin",
         )
     return None

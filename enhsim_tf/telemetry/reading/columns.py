@@ -4,7 +4,6 @@ series, or channel.
 
 import dataclasses
 import datetime
-import re
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -33,6 +32,7 @@ from enhsim_tf.telemetry.reading.clock import (
     find_clock,
     further_clocks,
     is_epoch,
+    is_unnamed,
     offset_of,
     refuse_own_clocks,
     unit_of,
@@ -67,7 +67,6 @@ _OBJECTS = {
     "times of day": datetime.time,
     "spans": datetime.timedelta,
 }
-_UNNAMED = re.compile(r"column 0|Unnamed: \d+|level_0").fullmatch
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -167,7 +166,7 @@ def lay_out(
             times = dataclasses.replace(times, stamps=stamps)
         if (
             not times.zone
-            and (offset := offset_of(clock, frame, options.timezone, what)) is not None
+            and (offset := offset_of(clock, frame, table.above, options.timezone, what)) is not None
         ):
             times = dataclasses.replace(
                 times, stamps=(times.stamps - offset).tz_localize("UTC"), zone="stated in its name"
@@ -181,7 +180,7 @@ def lay_out(
         and (
             clock.columns
             and _counts(values)
-            or _UNNAMED(name)
+            or is_unnamed(name)
             and not is_epoch(values)
             and len(np.unique(values)) == len(values)
             and not (values % 1).any()
@@ -314,7 +313,7 @@ def _labels_of(
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
     """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
     words = set(words_of(name))
-    if not (words and words <= _ROWS or _UNNAMED(name) and not is_epoch(values)):
+    if not (words and words <= _ROWS or is_unnamed(name) and not is_epoch(values)):
         return False
     return len(values) == 1 or bool(len(values)) and bool(np.mean(np.diff(values) == 1) >= 0.9)
 

@@ -176,13 +176,20 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
 
     def share(row: list[str]) -> float:
         """Share of the columns of numbers and dates that hold one in this row, none if its cells
-        are names that count, as in `,0,1`, or formats, as `5s` and `20d` of the USGS.
+        are names that count, as in `,0,1`, numbers behind a name, as in `time,31.5,63` on top, or
+        formats, as `5s` and `20d` of the USGS.
         """
         if row and all(map(_FORMAT, row)):
             return 0.0
         first, *others = row or [""]
         counts = [str(number) for number in range(len(row))]
-        if others and others in (counts[:-1], counts[1:]) and not _SOLID.match(first):
+        is_word = len(first) > 3 and first.isalpha() and first.casefold() not in ("none", "null")
+        is_named = is_word and row is filled[0] and 0 in solid
+        if (
+            (others in (counts[:-1], counts[1:]) or is_named and len({*others}) == len(others))
+            and others
+            and not _SOLID.match(first)
+        ):
             return 0.0
         marks = [place < len(row) and bool(_SOLID.match(row[place])) for place in solid]
         return sum(marks) / max(1, len(solid))

@@ -14,8 +14,10 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.read_errors import MAX_COLUMNS, reading
+from enhsim_tf.telemetry.cleaning.numbers import is_plain
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
+from enhsim_tf.telemetry.cleaning.times import epoch_unit
 from enhsim_tf.telemetry.reading.formats import HAS_TABLES, READERS, read_any_text
 from enhsim_tf.telemetry.reading.text_files import Table
 from enhsim_tf.telemetry.source_kinds import PACKED, SOURCES
@@ -45,15 +47,19 @@ def read_table(
 
 def files_of(folder: Path) -> list[Path]:
     """Returns the tables in a folder, in the order of their names: CSV files, or those of the next
-    kind if there are none.
+    kind if there are none. Refuses tables in CSV and in Parquet side by side.
     """
+    files = [path for path in folder.iterdir() if path.is_file() and path.name[0] != "."]
     for endings in (*_OF_FOLDERS, tuple(READERS)):
-        paths = [
-            path
-            for path in folder.iterdir()
-            if path.is_file() and _suffix_of(path) in endings and not path.name.startswith(".")
-        ]
+        paths = [path for path in files if suffix_of(path) in endings]
         if paths:
+            others = [path.name for path in files if suffix_of(path) == ".parquet"]
+            if others and endings == (".csv",):
+                raise InputError(
+                    f"Expected tables of one kind in a folder. Received: {paths[0].name} and "
+                    f"{others[0]} in {folder.name}.",
+                    otherwise="the files of one kind by their names",
+                )
             return sorted(
                 paths,
                 key=lambda path: [
@@ -65,7 +71,7 @@ def files_of(folder: Path) -> list[Path]:
     )
 
 
-def _suffix_of(path: Path) -> str:
+def suffix_of(path: Path) -> str:
     """Returns the ending of a file's name in lower case, without that of a packed file: `.csv` for
     `day1.CSV.gz`.
     """
@@ -74,7 +80,7 @@ def _suffix_of(path: Path) -> str:
 
 
 def _read_file(path: Path, options: Cleaning) -> Table:
-    content, suffix = _unpack(path)
+    content, suffix = unpack(path)
     if options.table is not None and suffix not in HAS_TABLES:
         raise InputError(
             f"Expected table (--table) with a file of several, {', '.join(HAS_TABLES)}. Received: "
@@ -83,11 +89,11 @@ def _read_file(path: Path, options: Cleaning) -> Table:
     return READERS.get(suffix, read_any_text)(content, path.name, options)
 
 
-def _unpack(path: Path) -> tuple[bytes, str]:
+def unpack(path: Path) -> tuple[bytes, str]:
     """Returns the content of a file, unpacked, and the ending of the file inside."""
     with reading(path.name):
         content = path.read_bytes()
-        suffix = _suffix_of(path)
+        suffix = suffix_of(path)
         if path.suffix.lower() == ".gz":
             content = gzip.decompress(content)
         if path.suffix.lower() != ".zip":
@@ -129,6 +135,11 @@ def _with_plain_columns(table: Table, name: str) -> Table:
     return dataclasses.replace(table, frame=frame)
 
 
+def _epoch_unit_of(cells: pd.Series) -> str | None:
+    """Returns the unit in which numbers may be times since 1970."""
+    return epoch_unit(float(cells.median())) if is_plain(cells) else None
+
+
 def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
     """Joins tables with the same columns."""
     names = list(tables[0].frame.columns)
@@ -143,7 +154,9 @@ def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
         columns = [table.frame[name].dtype for table in tables]
         dates = [each for each in columns if pd.api.types.is_datetime64_any_dtype(each)]
         has_zone = {isinstance(each, pd.DatetimeTZDtype) for each in dates}
-        if len(has_zone) > 1 or len({table.units.get(name, "") for table in tables}) > 1:
+        since = {_epoch_unit_of(table.frame[name]) for table in tables} - {None}
+        units = {table.units.get(name, "") for table in tables}
+        if max(map(len, (has_zone, since, units))) > 1:
             raise InputError(
                 f"Expected files that are written alike. Received: {name!r} of different units, or "
                 f"with and without a zone, in {paths[0].name} to {paths[-1].name}. Read them one "
@@ -173,4 +186,5 @@ def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
         next((each.decimal for each in tables if each.decimal), None),
         tuple(findings),
         tables[0].units,
+        tables[0].above,
     )

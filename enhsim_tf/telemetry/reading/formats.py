@@ -4,6 +4,7 @@ A reader takes the content of a file, its name and the options of reading, and r
 add a kind of file, write a reader and add its line.
 """
 
+import dataclasses
 import io
 import json
 import re
@@ -64,10 +65,13 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
                 raise
             records, is_whole = _lines_of(text, content.endswith(b"\n"), findings), False
     if len(records) == 1 and isinstance(records[0], dict):
+        if _holds_columns(records[0]):
+            return Table(pd.DataFrame(records[0]))
         with reading(name):
             lists = _lists_of(records[0])
         if lists:
-            return _of_arrays(lists, name, options)
+            above = " ".join(value for value in records[0].values() if isinstance(value, str))
+            return dataclasses.replace(_of_arrays(lists, name, options), above=above)
         names = ", ".join(records[0])
         raise InputError(
             f"Expected records, one in each line, or a list of them. Received: one record in "
@@ -82,6 +86,17 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
     with reading(name):
         frame = _frame_of(records[0] if is_whole else records)
     return Table(frame, findings=tuple(findings))
+
+
+def _holds_columns(record: Mapping[str, Any]) -> bool:
+    """Whether a record holds columns by their names, as pandas writes a table: values by row."""
+    columns = list(record.values())
+    rows = columns[0] if columns and isinstance(columns[0], dict) else {}
+    return (
+        len(rows) >= _FEWEST_ROWS
+        and all(isinstance(column, dict) and column.keys() == rows.keys() for column in columns)
+        and all(row.lstrip("-").isdigit() for row in rows)
+    )
 
 
 def _lines_of(text: str, is_ended: bool, findings: list[Finding]) -> list[Any]:
@@ -225,7 +240,7 @@ def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
     units: dict[str, str] = {}
 
     def add(path: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset) or item.attrs.get("MATLAB_class") == b"char":
+        if not isinstance(item, h5py.Dataset):
             return
         parent, _, key = path.rpartition("/")
         stated = {key.casefold(): np.ravel(value) for key, value in item.attrs.items()}
@@ -240,7 +255,9 @@ def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
                 "what xarray.open_dataset(file).to_dataframe() returns",
             )
         values = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
-        if values.dtype.names:
+        if item.attrs.get("MATLAB_class") == b"char":
+            arrays[parent, key] = np.array(["".join(map(chr, row)) for row in values.T], object)
+        elif values.dtype.names:
             arrays.update({(path, field): values[field] for field in values.dtype.names})
         else:  # MATLAB's axes are in reverse order
             arrays[parent, key] = values.T if content.startswith(_MATLAB) else values
@@ -260,11 +277,15 @@ def _of_arrays(
     `units` are by both with a slash between them.
     """
     tables: dict[tuple[str, int], dict[str, Any]] = {}
+    others: list[str] = []  # complex ones, and those with more dimensions
     for (group, key), values in arrays.items():
         values = np.squeeze(values)
         if values.dtype.kind == "S":
             values = np.char.decode(values, "utf-8", "replace")
-        if values.ndim not in (1, 2) or len(values) < 2 or values.dtype.kind not in "fiubUOM":
+        if not values.ndim or len(values) < 2:
+            continue
+        if values.ndim > 2 or values.dtype.kind not in "fiubUOM":
+            others.append(key)
             continue
         columns = tables.setdefault((group, len(values)), {})
         if values.ndim == 1:
@@ -274,8 +295,8 @@ def _of_arrays(
             columns |= {f"{key}.{number}": column for number, column in enumerate(values.T)}
     if not tables:
         raise InputError(
-            f"Expected vectors or matrices of numbers. Received: none in {name}. Save them as "
-            "variables of their own, or as CSV."
+            f"Expected vectors or matrices of numbers. Received: {', '.join(others) or 'none'} in "
+            f"{name}. Save them as variables of their own, or as CSV."
         )
     lengths = [group for group, _ in tables]
     firsts = [next(iter(columns)) for columns in tables.values()]
@@ -290,7 +311,9 @@ def _of_arrays(
     group, chosen = named[chosen_table(named, name, options)]
     frame = pd.DataFrame({key: pd.Series(values) for key, values in chosen.items()})
     stated = {key: (units or {}).get(f"{group}/{key}".strip("/"), "") for key in frame}
-    return Table(frame, units=stated)
+    text = f"arrays that are neither vectors nor matrices of real numbers: {', '.join(others[:8])}"
+    findings = (Finding("columns left out", len(others), text),) if others else ()
+    return Table(frame, findings=findings, units=stated)
 
 
 def refuse_channels_first(shape: tuple[int, int], what: str) -> None:

@@ -27,6 +27,8 @@ from enhsim_tf.telemetry.reading.dialect import BLANKS, HEAD, Dialect, behind, f
 
 _HEAD = 100_000  # bytes that are searched for blanks before cells
 _LOOK = 2_000  # cells of a column that are searched for a decimal comma
+_FEWEST_FLAGS = 20  # cells below which nothing is said about the digits behind a comma
+_MAX_FLAGS = 3  # different ones, above which they are decimals
 # plain ones, which pandas reads faster than text; other cells in their column leave it text
 _TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d").match
 _DIGITS = re.compile(r"[+-]?[.,]?\d").match
@@ -48,6 +50,7 @@ class Table:
     findings: tuple[Finding, ...] = ()  # for the cleaning log
     # cells of a line of units by column
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    above: str = ""  # text that the file has beside the table
 
 
 def table_of(
@@ -132,7 +135,11 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
         )
     table = table_of(frame, dialect, name, decimal, findings, options.skip_rows)
     behind_them = [(row - before, row + above + 2, name) for before, row in enumerate(repeated)]
-    return dataclasses.replace(table, places=Places((*table.places.files, *behind_them)))
+    return dataclasses.replace(
+        table,
+        places=Places((*table.places.files, *behind_them)),
+        above=" ".join(head.split("\n", dialect.first_line)[: dialect.first_line]),
+    )
 
 
 def _may_be_ragged(frame: pd.DataFrame, data: bytes, dialect: Dialect) -> bool:
@@ -197,6 +204,8 @@ def _read_rows(
         return _parse(data, dialect, decimal), decimal  # no cell has a comma
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
     sign = decimal or ("," if any(shows_comma(_some(head[column])) for column in head) else None)
+    if dialect.separator == "," and decimal is None:
+        _refuse_flags(head, names, name)
     if sign is None and dialect.separator == ";":
         sign = _sign_of_country(head, names, name)
     frame = _parse(data, dialect, sign)
@@ -236,6 +245,24 @@ def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str
             SIGNS,
         )
     return "," if not pointed and any(has_commas(cells) for cells in columns) else None
+
+
+def _refuse_flags(head: pd.DataFrame, names: Sequence[str], name: str) -> None:
+    """Refuses numbers with a digit behind a comma that hardly varies, as the flag of quality that
+    weather services write behind a value.
+    """
+    digits = head.apply(
+        lambda cells: cells.str.extract(r"^[+-]?(?:0|[1-9]\d*),(\d)$", expand=False)
+    )
+    for column in digits:
+        found = digits[column].dropna()
+        if len(found) >= _FEWEST_FLAGS and found.nunique() <= _MAX_FLAGS:
+            raise InputError(
+                f"Expected one number in each cell. Received: {head[column][found.index[0]]!r} in "
+                f"{names[column]!r} of {name}, which may be a number and a flag.",
+                (),
+                "values and flags in columns of their own, or --decimal , if it is a decimal",
+            )
 
 
 def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
