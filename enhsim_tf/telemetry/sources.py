@@ -21,7 +21,8 @@ from enhsim_tf.telemetry.cleaning.report import Finding
 from enhsim_tf.telemetry.influx_store import InfluxStore
 from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.reading.channels import Channels, read_table_channels
-from enhsim_tf.telemetry.reading.clock import NO_TIME, is_regular
+from enhsim_tf.telemetry.reading.clock import NO_TIME
+from enhsim_tf.telemetry.reading.clock_values import is_regular
 from enhsim_tf.telemetry.reading.files import suffix_of, unpack
 from enhsim_tf.telemetry.reading.formats import refuse_channels_first
 from enhsim_tf.telemetry.series import Telemetry

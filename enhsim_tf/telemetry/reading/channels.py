@@ -23,7 +23,8 @@ from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.cleaning.times import jumps_back
-from enhsim_tf.telemetry.reading.clock import NO_TIME, words_of
+from enhsim_tf.telemetry.reading.clock import NO_TIME
+from enhsim_tf.telemetry.reading.column_names import words_of
 from enhsim_tf.telemetry.reading.columns import Layout, anomalous, lay_out
 from enhsim_tf.telemetry.reading.files import read_table
 from enhsim_tf.telemetry.reading.text_files import Table

@@ -28,16 +28,15 @@ from enhsim_tf.telemetry.cleaning.times import (
 )
 from enhsim_tf.telemetry.reading.clock import (
     NO_TIME,
-    Clock,
     find_clock,
     further_clocks,
-    is_epoch,
-    is_unnamed,
     offset_of,
     refuse_own_clocks,
     unit_of,
-    words_of,
 )
+from enhsim_tf.telemetry.reading.clock_parts import Clock
+from enhsim_tf.telemetry.reading.clock_values import is_epoch
+from enhsim_tf.telemetry.reading.column_names import is_unnamed, words_of
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set(

@@ -1,0 +1,211 @@
+"""Clocks that several columns make together: a date and a time of day, parts of both such as years
+and hours, seconds and their fractions.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.times import LOOK, parse_times
+from enhsim_tf.telemetry.reading.clock_values import are_whole
+from enhsim_tf.telemetry.reading.column_names import UNIT_OF, UNITS, without_ends, words_of
+
+_PARTS = {
+    "year": "year yyyy yy yr jahr",
+    "month": "month mo mm monat",
+    "day": "day dy dom dd tag",
+    "doy": "doy dayofyear jday ddd",
+    "hour": "hour hr hh stunde hourending hourbeginning",
+    "minute": "minute min mn",
+    "second": "second sec ss sekunde sod secondofday",
+} | {unit: UNITS[unit] for unit in ("ms", "us", "ns")}
+_PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
+_FRACTIONS = {"ms": 999, "us": 999_999, "ns": 999_999_999}  # of a second, at most
+_MOST = {"hour": 24, "minute": 60, "second": 60} | _FRACTIONS  # of a time of day
+_STATISTICS = set("max maximum mean avg average".split())  # beside which `min` is no minute
+_CLOSE = 0.02  # by which fractions of a second may make the steps of a clock less alike
+_FEW = 0.05  # share of the rows in which a part of a time may be out of range
+_ADDED = {"doy": "D", "hour": "h", "minute": "min", "second": "s", "ms": "ms"}
+_ADDED |= {"us": "us", "ns": "ns"}
+
+
+class Clock(NamedTuple):
+    """The clock of a table: the columns that make it up, none if samples are counted; one cell per
+    row, to be parsed as times; and what is added to these times.
+    """
+
+    columns: tuple[str, ...] = ()
+    cells: pd.Series | None = None
+    added: pd.Series | None = None  # time spans
+
+
+def joined_clock(
+    frame: pd.DataFrame,
+    kinds: Mapping[str, str],
+    dates: list[str],
+    numbers: Mapping[str, np.ndarray],
+) -> Clock | None:
+    """Returns the clock that a column of dates and columns of the time of day, in text or whole
+    numbers, make together, or None.
+    """
+    hours = without_ends([name for name in kinds if kinds[name] == "times of day"])
+    if len(dates) != 1 or len(hours) > 1:
+        return None
+    cells = frame[dates[0]]
+    if dates[0] in numbers:
+        text = numbers[dates[0]].astype(np.int64).astype(str)
+        cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
+    is_day = are_days(cells)
+    has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # far dates have no text with one
+    head = (cells.dt.tz_convert(None) if has_zone else cells).dropna().iloc[:LOOK].astype("str")
+    whole_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
+    parts = {part: name for part, name in _parts_of(numbers).items() if part in _MOST}
+    below = {part: name for part, name in parts.items() if part in _FRACTIONS}
+    if hours and is_day:
+        lacks = frame[hours[0]].dropna().iloc[:LOOK].astype("str").str.fullmatch(r" *\d\d?:\d\d *")
+        has_seconds = "second" in parts and np.nanmax(numbers[parts["second"]]) <= _MOST["second"]
+        parts = ({"second": parts["second"]} if lacks.all() and has_seconds else {}) | below
+    elif not is_day and below and whole_seconds:
+        parts = below
+    elif not is_day or "hour" not in parts:
+        parts = {}
+    elif "second" not in parts:
+        parts = {part: name for part, name in parts.items() if part not in below}
+    texts: list[str] = []
+    if hours and is_day:
+        texts = hours + [
+            name
+            for name, kind in kinds.items()
+            if kind == "words" and frame[name].dropna().isin(["AM", "PM", "am", "pm"]).all()
+        ]
+        if pd.api.types.is_datetime64_any_dtype(cells.dtype):
+            cells = cells.dt.strftime("%Y-%m-%d")
+        # a date may stand in the first row of each day only
+        cells = cells.astype("str").str.strip().ffill()
+        for name in texts:
+            cells = cells + " " + frame[name].astype("str").str.strip()
+    added = _added(numbers, parts)
+    if parts and parts.keys() <= _FRACTIONS.keys() and not _makes_alike(cells, added):
+        parts, added = {}, None
+    columns = (dates[0], *texts, *parts.values())
+    return Clock(columns, cells, added) if len(columns) > 1 else None
+
+
+def clock_of_parts(numbers: Mapping[str, np.ndarray]) -> Clock | None:
+    """Returns the clock of columns for the year, the month and day or the day of year, and perhaps
+    the time of day, or None.
+    """
+    parts = _parts_of(numbers)
+    if not {"doy", "month"} & set(parts) or "year" not in parts:
+        return None
+    years = numbers[parts["year"]]
+    if not are_whole(years[np.isfinite(years)], 1900, 2200):
+        return None
+    if "second" not in parts:
+        parts = {part: name for part, name in parts.items() if part not in _FRACTIONS}
+    of_date = ("month", "day") if "doy" not in parts else ()
+    days = {part: numbers[parts[part]] if part in parts else 1.0 for part in of_date}
+    days = pd.DataFrame({"year": years, "month": 1.0, "day": 1.0} | days)
+    stamps = pd.to_datetime(days, errors="coerce").astype("datetime64[ns]")
+    return Clock(tuple(parts.values()), stamps, _added(numbers, parts))
+
+
+def seconds_and_fractions(numbers: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
+    """Returns the pairs of columns of whole seconds and of the fractions of a second behind them,
+    of names that are alike apart from their units.
+    """
+    stems: dict[tuple[str, ...], str] = {}
+    for name in numbers:
+        *stem, last = words_of(name) or [""]
+        stems[(*stem, UNIT_OF.get(last, ""))] = name
+    pairs = []
+    for (*stem, unit), name in stems.items():
+        seconds = stems.get((*stem, "s"))
+        if unit in _FRACTIONS and seconds is not None:
+            rest = numbers[name]
+            is_part = are_whole(rest, 0, _FRACTIONS[unit])
+            wraps = (np.diff(rest) < 0).any() or np.ptp(numbers[seconds]) == 0
+            if is_part and (numbers[seconds] % 1 == 0).all() and wraps:
+                pairs.append((seconds, name))
+    return pairs
+
+
+def are_days(cells: pd.Series) -> bool:
+    """Whether dates have no time of day; who keeps a zone keeps times."""
+    if isinstance(cells.dtype, pd.DatetimeTZDtype):  # far ones have no text
+        return False
+    head = cells.dropna().iloc[:LOOK].astype("str")
+    return not head.str.contains(r":|T\d|\d{8}\d").any()
+
+
+def _makes_alike(cells: pd.Series, added: pd.Series) -> bool:
+    """Whether fractions of a second are those of a clock: they are the same throughout, or go
+    through a tenth of a second or more, unless its dates repeat, and its steps do not become less
+    alike by them.
+    """
+    try:
+        stamps = parse_times(cells, "", drop=True).stamps
+    except InputError:  # which is said when the clock is read
+        return True
+
+    def spread(times: pd.DatetimeIndex) -> float:
+        steps = np.diff(times.dropna().as_unit("ns").asi8)
+        usual = np.median(steps) if len(steps) else 0
+        return float(np.mean(np.abs(steps / usual - 1))) if usual > 0 else np.inf
+
+    if added.nunique() == 1:
+        return added.iloc[0] == pd.Timedelta(0) or added.iloc[0] >= pd.Timedelta("1ms")
+    both = stamps + pd.TimedeltaIndex(added)
+    is_wide = added.max() - added.min() >= pd.Timedelta("100ms")
+    before = spread(stamps)
+    return (is_wide or before == np.inf) and spread(both) <= before + _CLOSE
+
+
+def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
+    """Returns the columns that are named like parts of a date or a time of day, and may hold them,
+    by these parts.
+    """
+    found: dict[str, str] = {}
+    plain = {name: re.sub(r"\W|_", "", name.casefold()) for name in numbers}
+    for name, word in plain.items():
+        part = _PART_OF.get(word)
+        # the second of `MM` and `mm`
+        if word == "mm" and {"month", "doy"} & set(found):
+            part = "minute"
+        if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
+            found.setdefault(part, name)
+    if "hour" not in found and (
+        "second" in found or not plain.get(found.get("minute"), "").startswith("minute")
+    ):
+        found.pop("minute", None)
+    most = _most_of(found)
+    for part in found.keys() & most.keys():
+        values = numbers[found[part]]
+        is_whole = part in ("hour", "second") or (values[np.isfinite(values)] % 1 == 0).all()
+        if not is_whole or np.mean((values > most[part]) | (values < 0)) > _FEW:
+            del found[part]
+    return found
+
+
+def _most_of(parts: Mapping[str, str]) -> Mapping[str, int]:
+    """Returns the largest values of parts of a time; minutes and seconds without hours are those of
+    a day.
+    """
+    return _MOST if "hour" in parts else _MOST | {"minute": 1_439, "second": 86_400}
+
+
+def _added(numbers: Mapping[str, np.ndarray], parts: Mapping[str, str]) -> pd.Series | None:
+    """Returns the sum of the parts of a time of day, and of days of a year; None without any."""
+    most = _most_of(parts)
+    spans = []
+    for part, unit in _ADDED.items():
+        if part in parts:
+            values = numbers[parts[part]] - (part == "doy")
+            is_known = (values >= 0) & (values <= most.get(part, np.inf))  # others have no time
+            spans.append(pd.Series(pd.to_timedelta(np.where(is_known, values, np.nan), unit=unit)))
+    unit = "ns" if "ns" in parts else "us"
+    return sum(spans[1:], spans[0]).dt.round(unit) if spans else None
