@@ -155,21 +155,7 @@ def lay_out(
         )
     else:
         clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
-    times = None
-    if clock.columns:
-        form = options.time_format or unit_of(clock, table.units, what)
-        of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-        times = parse_times(clock.cells, of_what, options.drop_bad, form, table.places)
-        if clock.added is not None:
-            stamps = times.stamps + pd.TimedeltaIndex(clock.added)
-            times = dataclasses.replace(times, stamps=stamps)
-        if (
-            not times.zone
-            and (offset := offset_of(clock, frame, table.above, options.timezone, what)) is not None
-        ):
-            times = dataclasses.replace(
-                times, stamps=(times.stamps - offset).tz_localize("UTC"), zone="stated in its name"
-            )
+    times = _times_of(clock, table, options, what) if clock.columns else None
     take("clock", clock.columns)
     take("further clocks", further_clocks(clock, times, numbers, kinds))
     counted = [
@@ -197,6 +183,23 @@ def lay_out(
         if roles.get(name, "") not in ("", "clock", "series"):
             left_out.setdefault(roles[name], []).append(name)
     return Layout(clock, times, tuple(channels), tuple(left_out.get("labels", ())), words, left_out)
+
+
+def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times:
+    """Parses a clock, with what its other columns add and the zone that its name states."""
+    form = options.time_format or unit_of(clock, table.units, what)
+    of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
+    times = parse_times(clock.cells, of_what, options.drop_bad, form, table.places)
+    if clock.added is not None:
+        stamps = times.stamps + pd.TimedeltaIndex(clock.added)
+        times = dataclasses.replace(times, stamps=stamps)
+    if times.zone:
+        return times
+    offset = offset_of(clock, table.frame, table.above, options.timezone, what)
+    if offset is None:
+        return times
+    stamps = (times.stamps - offset).tz_localize("UTC")
+    return dataclasses.replace(times, stamps=stamps, zone="stated in its name")
 
 
 def _kind_of(cells: pd.Series) -> str:

@@ -5,6 +5,7 @@ columns' names.
 import codecs
 import csv
 import dataclasses
+import itertools
 import re
 from collections.abc import Sequence
 from typing import NoReturn
@@ -174,41 +175,10 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
     sample = [row for row in last if len(row) == width]
     solid = [place for place in range(min(width, _LOOK)) if _is_solid(sample, place)]
 
-    def share(row: list[str]) -> float:
-        """Share of the columns of numbers and dates that hold one in this row, none if its cells
-        are names that count, as in `,0,1`, numbers behind a name, as in `time,31.5,63` on top, or
-        formats, as `5s` and `20d` of the USGS.
-        """
-        if row and all(map(_FORMAT, row)):
-            return 0.0
-        first, *others = row or [""]
-        counts = [str(number) for number in range(len(row))]
-        is_word = len(first) > 3 and first.isalpha() and first.casefold() not in ("none", "null")
-        is_named = is_word and row is filled[0] and 0 in solid
-        if (
-            (others in (counts[:-1], counts[1:]) or is_named and len({*others}) == len(others))
-            and others
-            and not _SOLID.match(first)
-        ):
-            return 0.0
-        marks = [place < len(row) and bool(_SOLID.match(row[place])) for place in solid]
-        return sum(marks) / max(1, len(solid))
-
-    begin = next(
-        (number for number, row in enumerate(rows) if len(row) == width and share(row) > 0.5), None
-    )
-    if begin is None:  # words only
-        begin = rows.index(filled[0]) + (not no_header)
-    while begin > 0 and len(rows[begin - 1]) == width and share(rows[begin - 1]) > 0:
-        begin -= 1
-    # rows below the names with too few or too many cells, which are refused as such
-    above = begin
-    while above > 0 and len(rows[above - 1]) != width and share(rows[above - 1]) > 0.5:
-        above -= 1
-    if 0 < above < begin and len(rows[above - 1]) == width and share(rows[above - 1]) == 0:
-        begin = above
+    shares = [_share(row, solid, row is filled[0]) for row in rows]
+    begin = _begin_of(rows, shares, width, otherwise=rows.index(filled[0]) + (not no_header))
     # of a last column that is mostly left out
-    lacks = begin > 0 and len(rows[begin - 1]) == width + 1 and share(rows[begin - 1]) == 0
+    lacks = begin > 0 and len(rows[begin - 1]) == width + 1 and shares[begin - 1] == 0
     width += lacks
     # a blank line may follow the names
     top = next((number for number in range(begin, 0, -1) if rows[number - 1]), 0)
@@ -217,39 +187,87 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
     while (
         block > 0
         and 0 < len(rows[block - 1]) <= width
-        and (share(rows[block - 1]) == 0 or len(rows) == 1)
+        and (shares[block - 1] == 0 or len(rows) == 1)
     ):
         block -= 1
     names = [""] * width
-    units = []
+    units: Sequence[str] = ()
+    has_names = block < top and not no_header
     if block < top and no_header:
         begin = block
-    skipped = sum(map(bool, rows[:begin]))
-    if block < top and not no_header:
-        # the line of the most different names, of several the first
-        header = max(range(block, top), key=lambda number: len({*rows[number]} - {""}))
-        given = rows[header]
+    if has_names:
+        found = _names_of(rows[block:top], rows[begin], sample, mark, width)
+        if found is None:
+            return None
+        names, units = found
+    skipped = sum(map(bool, rows[:begin])) - has_names
+    head = [row for row in rows[begin:] if row]
+    may_lack_last = lacks or any(names) and not names[-1]
+    return Dialect(mark or ",", names, begin, skipped, head, units, may_lack_last)
+
+
+def _share(row: list[str], solid: Sequence[int], is_first: bool) -> float:
+    """Share of the columns of numbers and dates that hold one in a row, none if its cells are names
+    that count, as in `,0,1`, numbers behind a name, as in `time,31.5,63` in the first row, or
+    formats, as `5s` and `20d` of the USGS.
+    """
+    if row and all(map(_FORMAT, row)):
+        return 0.0
+    first, *others = row or [""]
+    counts = [str(number) for number in range(len(row))]
+    is_word = len(first) > 3 and first.isalpha() and first.casefold() not in ("none", "null")
+    is_named = is_word and is_first and 0 in solid and len({*others}) == len(others)
+    if others and (others in (counts[:-1], counts[1:]) or is_named) and not _SOLID.match(first):
+        return 0.0
+    marks = [place < len(row) and bool(_SOLID.match(row[place])) for place in solid]
+    return sum(marks) / max(1, len(solid))
+
+
+def _begin_of(
+    rows: Sequence[Sequence[str]], shares: Sequence[float], width: int, otherwise: int
+) -> int:
+    """Returns the first row of the data; `otherwise` if there are only words."""
+    is_wide = [len(row) == width for row in rows]
+    begin = next(
+        (number for number, wide in enumerate(is_wide) if wide and shares[number] > 0.5), otherwise
+    )
+    while begin > 0 and is_wide[begin - 1] and shares[begin - 1] > 0:
+        begin -= 1
+    # rows below the names with too few or too many cells, which are refused as such
+    above = begin
+    while above > 0 and not is_wide[above - 1] and shares[above - 1] > 0.5:
+        above -= 1
+    is_below_names = 0 < above < begin and is_wide[above - 1] and shares[above - 1] == 0
+    return above if is_below_names else begin
+
+
+def _names_of(
+    block: Sequence[list[str]],
+    below: Sequence[str],
+    sample: Sequence[Sequence[str]],
+    mark: str,
+    width: int,
+) -> tuple[list[str], Sequence[str]] | None:
+    """Returns the names and the units in a block of lines above the first row of data, or None if
+    columns of a sample of the data have none.
+    """
+    # the line of the most different names, of several the first
+    header = max(range(len(block)), key=lambda number: len({*block[number]} - {""}))
+    given = block[header]
+    if mark == BLANKS and len(given) == width - 1:
         # a date and a time of day below one name
-        if mark == BLANKS and 1 < len(given) == width - 1 and ":" in rows[begin][1]:
+        if len(given) > 1 and ":" in below[1]:
             given = ["", *given]
         # R writes quoted names, and none above the numbers of the rows
-        if mark == BLANKS and len(given) == width - 1 and rows[begin][0] == '"1"':
+        elif below[0] == '"1"':
             given = ["", *(cell.strip('"') for cell in given)]
-        if any(any(row[len(given) :]) for row in sample):
-            return None
-        names = given + names[len(given) :]
-        skipped -= 1
-        if not any(names):
-            return None
-        # names in two lines, as under merged cells
-        for row in rows[block:header] + rows[header + 1 : top]:
-            row = row + names[len(row) :]
-            names = [name or other for name, other in zip(names, row, strict=True)]
-        units = rows[header + 1] if header + 1 < top else []
-    head = [row for row in rows[begin:] if row]
-    mark = "," if mark == _WHOLE else mark
-    may_lack_last = lacks or any(names) and not names[-1]
-    return Dialect(mark, names, begin, skipped, head, units, may_lack_last)
+    if not any(given) or any(any(row[len(given) :]) for row in sample):
+        return None
+    names = given + [""] * (width - len(given))
+    # names in two lines, as under merged cells
+    for row in (*block[:header], *block[header + 1 :]):
+        names = [name or other for name, other in itertools.zip_longest(names, row, fillvalue="")]
+    return names, block[header + 1] if header + 1 < len(block) else ()
 
 
 def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
