@@ -15,12 +15,12 @@ from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.simulator.model_folder import channels_of, folder_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean_all
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.report import Report
 from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.reading.channels import Channels
-from enhsim_tf.telemetry.series import Telemetry, check_values
+from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 
 
@@ -169,19 +169,9 @@ def cleaned_channels(
     for each such group, and the reports of cleaning. A channel that cannot be used goes into
     `failed` with the error, if it is given.
     """
-    telemetry = {}
-    reports = {}
-    for name, raw in channels.items():
-        try:
-            usable = clean(raw, cleaning)
-            check_values(usable.telemetry.values[:, 0], name)
-        except InputError as error:
-            if failed is None:
-                raise
-            failed[name] = error
-        else:
-            telemetry[name] = usable.telemetry
-            reports[name] = usable.report
+    cleaned = clean_all(channels, cleaning, failed=failed)
+    telemetry = {name: each.telemetry for name, each in cleaned.items()}
+    reports = {name: each.report for name, each in cleaned.items()}
     return (join_channels(telemetry) if telemetry else []), reports
 
 

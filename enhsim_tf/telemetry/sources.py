@@ -15,7 +15,7 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.read_errors import MAX_COLUMNS, reading
-from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean_all
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.report import Finding
 from enhsim_tf.telemetry.influx_store import InfluxStore
@@ -98,9 +98,8 @@ def read_telemetry(
     """
     cleaning = cleaning or Cleaning()
     channels = read_source(source, columns, time, cleaning)
-    return join_channels(
-        {name: clean(raw, cleaning, describe=False).telemetry for name, raw in channels.items()}
-    )
+    cleaned = clean_all(channels, cleaning, describe=False)
+    return join_channels({name: each.telemetry for name, each in cleaned.items()})
 
 
 def _read_influx(

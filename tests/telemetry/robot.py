@@ -10,7 +10,7 @@ from pathlib import Path
 from enhsim_tf.cli.arguments import parse
 from enhsim_tf.cli.checks import cleaning_options
 from enhsim_tf.common.errors import InputError, option_text
-from enhsim_tf.telemetry.cleaning.clean import clean
+from enhsim_tf.telemetry.cleaning.clean import clean_all
 from enhsim_tf.telemetry.sources import read_source
 
 STEPS = 3
@@ -30,7 +30,7 @@ def read(words: list[str]) -> dict:
     options = parse(["inject", *words, "--kinds", "spike", "--out", "out"])
     cleaning = cleaning_options(options, 3)
     channels = read_source(options.source, options.column, options.time, cleaning)
-    return {name: clean(raw, cleaning) for name, raw in channels.items()}
+    return clean_all(channels, cleaning)
 
 
 def follow(words: list[str], given: tuple[str, ...] = ()) -> list[Ending]:

@@ -14,9 +14,10 @@ from enhsim_tf.datasets.inject import inject
 from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.datasets.options import InjectOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.times import epoch_unit
 from enhsim_tf.telemetry.reading.columns import anomalous
-from enhsim_tf.telemetry.sources import read_source
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
 
 N = 60
 VALUES = (20 + 5 * np.sin(np.arange(N) / 5)).round(2)
@@ -375,6 +376,10 @@ READ = {
         ZERO,
     ),
     "units behind all numbers": (table("time,v", UTC, [f"{value} °C" for value in VALUES]), START),
+    "times of day without zeros": (
+        table("date,time,v", stamps("%Y-%m-%d"), [f"{k.hour}:{k.minute}:0" for k in TIMES], VALUES),
+        START,
+    ),
     "NaN of C": (table("time,v", UTC, VALUES).replace(f",{VALUES[30]}\n", ",-nan(ind)\n"), START),
 }
 
@@ -672,6 +677,32 @@ REFUSED = {
     "a number and a flag in one cell": (
         table("time,v", UTC, [f'"{round(100 * value)},{k % 2}"' for k, value in enumerate(VALUES)]),
         "values and flags in columns of their own",
+    ),
+    "dates of another zone than times since 1970 beside them": (
+        table("unix,time,v", 1_709_251_200 + SECONDS, stamps("%Y-%m-%d 10:%M:%S"), VALUES),
+        "10 h apart",
+        {"time": "unix"},
+        60,
+    ),
+    "microseconds from zero": (
+        table("time,v", 2_000 * np.arange(N), VALUES),
+        "--time-format us",
+        {"options": Cleaning(time_format="us")},
+        0.002,
+    ),
+    "semicolons, decimal commas and no names": (
+        table("", SECONDS, commas(VALUES), commas(VALUES), separator=";").strip(),
+        "--no-header",
+        {"options": Cleaning(no_header=True), "time": "column 0", "columns": ["column 2"]},
+        60,
+    ),
+    "fewer names than values": (
+        table("time\tv (V)", SECONDS, VALUES, VALUES, separator="\t"),
+        "2 names",
+    ),
+    "no names above values that count": (
+        table("@0:00,1,2", stamps("@%H:%M"), [1] * N, [2] * N),
+        "--no-header",
     ),
     "a zone beside the table": (
         table("time,v", MINUTES, VALUES, above="zone\nEurope/Berlin\n\n"),
@@ -1218,6 +1249,37 @@ def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused)
     (tmp_path / "amps.csv").write_text("".join(PLAIN.splitlines(keepends=True)[:20]))
     with refused("amps.csv and volts.csv over the same times"):
         read_source(tmp_path)
+
+
+def test_few_different_numbers_with_one_unit_are_numbers():
+    parsed, bad, _ = parse_numbers(["960 hPa", "961 hPa"], "")
+    assert parsed.tolist() == [960, 961] and not bad.any()
+
+
+def test_a_blank_last_line_leaves_row_numbers_what_they_are(tmp_path):
+    (tmp_path / "a.csv").write_text(
+        table("time,id,v", UTC, range(11, 11 + N), VALUES, below=",,\n")
+    )
+    assert list(read_source(tmp_path / "a.csv")) == ["v"]
+
+
+def test_a_channel_that_cannot_be_read_leaves_the_others_as_an_option(tmp_path, refused):
+    sparse = ["" if k not in (3, 40) else 5 for k in range(N)]
+    (tmp_path / "a.csv").write_text(table("time,v,w", UTC, VALUES, sparse))
+    with refused("--column v"):
+        read_telemetry(tmp_path / "a.csv", Cleaning(min_part=3))
+    (telemetry,) = read_telemetry(tmp_path / "a.csv", Cleaning(min_part=3), ["v"])
+    assert len(telemetry) == N
+
+
+def test_words_that_repeat_times_are_states_on_request(refused):
+    frame = pd.DataFrame({"time": TIMES.repeat(2), "a": ["on", "off"] * N, "b": ["x", "y"] * N})
+    with refused("--states --series-column none"):
+        read_source(frame)
+    assert set(read_source(frame, options=Cleaning(states=True, series_column="none"))) == {
+        "a",
+        "b",
+    }
 
 
 def test_tables_in_csv_and_parquet_are_no_parts_of_one_series(tmp_path, refused):

@@ -7,6 +7,7 @@ gaps are filled, and the series is split at long gaps. Input that cannot be inte
 
 import dataclasses
 import functools
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,18 @@ from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.regular_grid import regularise
 from enhsim_tf.telemetry.cleaning.report import CleaningLog, Finding, Report
 from enhsim_tf.telemetry.cleaning.times import Times, localize_times, refuse_steps_back
-from enhsim_tf.telemetry.series import COUNTED, DATES, SAMPLES, Clock, Part, Telemetry, iso_time
+from enhsim_tf.telemetry.series import (
+    COUNTED,
+    DATES,
+    SAMPLES,
+    Clock,
+    Part,
+    Telemetry,
+    check_values,
+    iso_time,
+)
+
+_FEW = 8  # channels that a message names
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,6 +141,33 @@ def clean(
         tuple(log.findings),
     )
     return Cleaned(telemetry, report)
+
+
+def clean_all(
+    channels: Mapping[str, RawChannel],
+    options: Cleaning,
+    describe: bool = True,
+    failed: dict[str, Exception] | None = None,
+) -> dict[str, Cleaned]:
+    """Cleans channels by their names. One that cannot be used goes into `failed` with its error;
+    without `failed`, the error is raised, and its last option names the other channels.
+    """
+    cleaned = {}
+    errors: dict[str, InputError] = {}
+    for name, raw in channels.items():
+        try:
+            usable = clean(raw, options, describe)
+            check_values(usable.telemetry.values[:, 0], name)
+            cleaned[name] = usable
+        except InputError as error:
+            errors[name] = error
+    if failed is not None:
+        failed.update(errors)
+    elif errors:
+        error = next(iter(errors.values()))
+        others = [{"columns": list(cleaned)}] if 0 < len(cleaned) <= _FEW else []
+        raise InputError(error.message, [*error.options, *others], error.otherwise) from None
+    return cleaned
 
 
 def _rows_with_times(

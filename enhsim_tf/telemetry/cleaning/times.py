@@ -59,7 +59,8 @@ _MIDNIGHT = r"(?<=[T ])24(?=:00)"  # at the end of a day
 LOOK = 200  # number of cells that are inspected to find a form
 _MAX_JUMPS = 100  # above which times are in no order
 TIME_OF_DAY = (
-    r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>[.,]\d+)?)?)(?P<half> ?[AaPp][Mm])?"
+    r"(?P<time>\d\d?:(?:\d\d|\d(?=:\d))(?P<seconds>:\d\d?(?P<fraction>[.,]\d+)?)?)"
+    r"(?P<half> ?[AaPp][Mm])?"
 )
 # more than a day; 24:00:00 may be its end
 _ELAPSED = r"(?:24(?!:00:00)|2[5-9]|[3-9]\d|\d{3,}):\d\d:\d\d(?:\.\d+)?"
@@ -318,7 +319,7 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
     has_hours = 1e4 <= high or np.ptp(np.diff(values)) > 0  # 50 after 0, and 100 after 50, are none
     if has_hours and low // 100 < high // 100 and may_be_time_of_day(values):
         found["times of day"] = ()
-    if is_whole and 0 < low < 1.2e9 and step >= 1_000 and step % 60 > 0:
+    if is_whole and 0 <= low < 1.2e9 and step >= 1_000 and step % 60 > 0:
         found["ms or us"] = ("ms", "us")
     if form := compact_form(values):
         found["dates"] = (form,)
@@ -458,14 +459,15 @@ def _end(found: re.Match) -> str:
 
 
 def _plain(text: pd.Series) -> pd.Series:
-    """Rewrites what no parser takes: decimal commas in seconds, UTC in words, and intervals, of
-    which the start is kept.
+    """Rewrites what no parser takes: decimal commas in seconds, UTC in words, times of day without
+    leading zeros, and intervals, of which the start is kept.
     """
     return (
         text.str.strip()
         .str.replace(r"^(\d{4}-\d\d-\d\dT[^/]*)/.*", r"\1", regex=True)
         .str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True)
         .str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
+        .str.replace(r"(?<=[T :])(\d)(?=:\d|\.\d|$)", r"0\1", regex=True)
         .str.replace(r"([AaPp])\. ?[Mm]\.?$", r"\1M", regex=True)
     )
 

@@ -142,7 +142,9 @@ def read_table_channels(
         other = "one number in each cell; a workbook needs the saved values of its formulas"
         raise InputError(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
-            [{"states": True}] if has_states and not options.states else (),
+            [{"states": True} | ({"series_column": NO_TIME} if keys else {})]
+            if has_states and not options.states
+            else (),
             pairs if _PAIR.search(left) else other,
         )
     channels = {

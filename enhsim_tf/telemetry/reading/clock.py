@@ -19,6 +19,7 @@ from enhsim_tf.telemetry.cleaning.times import (
     LOOK,
     Times,
     compact_form,
+    epoch_unit,
     may_be_time_of_day,
     parse_times,
     refuse_two_meanings,
@@ -304,6 +305,22 @@ def offset_of(
             "the zone of the clock, as Europe/Berlin",
         )
     return None
+
+
+def refuse_other_zone(times: Times, numbers: Mapping[str, np.ndarray], what: str) -> None:
+    """Refuses dates without a zone that numbers since 1970 show in another zone than UTC."""
+    for name, values in numbers.items():
+        if is_epoch(values):
+            unit = epoch_unit(float(np.nanmedian(values)))
+            stamps = pd.to_datetime(values, unit=unit, errors="coerce")
+            apart = abs((stamps - times.stamps).median())
+            if pd.Timedelta("15min") <= apart <= pd.Timedelta("14h"):
+                raise InputError(
+                    f"Expected dates that agree with times since 1970. Received: {name!r} of "
+                    f"{what}, {apart.total_seconds() / 3600:g} h apart from them.",
+                    [{"time": name}],
+                    "the zone of the dates with --timezone",
+                )
 
 
 def refuse_own_clocks(

@@ -31,6 +31,7 @@ from enhsim_tf.telemetry.reading.clock import (
     find_clock,
     further_clocks,
     offset_of,
+    refuse_other_zone,
     refuse_own_clocks,
     unit_of,
 )
@@ -157,7 +158,10 @@ def lay_out(
         clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
     times = _times_of(clock, table, options, what) if clock.columns else None
     take("clock", clock.columns)
-    take("further clocks", further_clocks(clock, times, numbers, kinds))
+    further = further_clocks(clock, times, numbers, kinds)
+    take("further clocks", further)
+    if times is not None and not times.zone and options.timezone is None:
+        refuse_other_zone(times, {name: numbers[name] for name in further & set(numbers)}, what)
     counted = [
         name
         for name, values in numbers.items()
@@ -317,7 +321,8 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
     words = set(words_of(name))
     if not (words and words <= _ROWS or is_unnamed(name) and not is_epoch(values)):
         return False
-    return len(values) == 1 or bool(len(values)) and bool(np.mean(np.diff(values) == 1) >= 0.9)
+    known = values[np.isfinite(values)]  # a blank line has no number
+    return len(known) == 1 or bool(len(known)) and bool(np.mean(np.diff(known) == 1) >= 0.9)
 
 
 def _counts(values: np.ndarray) -> bool:

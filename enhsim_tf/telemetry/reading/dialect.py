@@ -101,15 +101,25 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         separator = stated[1]
     if not any(map(_is_content, lines)):
         raise ValueError("it is empty")
-    found = [_lay_out(mark, lines, no_header) for mark in separator or _SEPARATORS]
-    found = [layout for layout in found if layout and len(layout.names) > 1]
+    layouts = [_lay_out(mark, lines, no_header) for mark in separator or _SEPARATORS]
+    found = [layout for layout in layouts if layout and len(layout.names) > 1]
     if not found:
+        for layout in layouts:
+            if layout and not layout.names:
+                _refuse_header(layout, lines, name)
         by_blanks, single = (_lay_out(mark, lines, no_header) for mark in (BLANKS, _WHOLE))
         has_blanks = by_blanks is not None and len(by_blanks.names) > 1
         found = [by_blanks if has_blanks else single]
     if found == [None]:
         raise ValueError("lines of different lengths")
-    with_header = [layout for layout in found if any(layout.names)]
+    marks = [layout.separator for layout in found]
+    # no names are those that all hold another separator of the data
+    with_header = [
+        layout
+        for layout in found
+        if any(layout.names)
+        and not any(all(mark in name for name in layout.names if name) for mark in marks)
+    ]
     best = max(with_header, key=lambda layout: len(layout.names), default=found[0])
     if not with_header and not no_header:
         best = _named_by_comment(best, lines)
@@ -124,13 +134,13 @@ def _refuse_header(found: Dialect, lines: Sequence[str], name: str) -> NoReturn:
     """Refuses data without a line of names above it, or with one of another number of names."""
     above = [number for number in range(found.first_line) if _is_content(lines[number])]
     cells = _split(lines[above[-1] : above[-1] + 1], found.separator)[0] if above else []
-    width = len(found.names)
+    width = len(found.head[0])
     marks = found.separator != BLANKS
-    if marks and len(cells) > width and not any(map(_SOLID.match, cells)):
+    if marks and 1 < len(cells) != width and not any(map(_SOLID.match, cells)):
         raise InputError(
             f"Expected as many names as values. Received: {len(cells)} names in line "
             f"{above[-1] + 1} of {name}, above {width} values.",
-            otherwise="names with a separator inside in quotation marks, or rename them",
+            otherwise="a name for each column, in quotation marks if it holds a separator",
         )
     first = ", ".join(found.head[0][:4]) if found.head else "none"
     raise InputError(
@@ -192,15 +202,14 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
         block -= 1
     names = [""] * width
     units: Sequence[str] = ()
-    has_names = block < top and not no_header
     if block < top and no_header:
         begin = block
-    if has_names:
-        found = _names_of(rows[block:top], rows[begin], sample, mark, width)
-        if found is None:
+    elif block < top:
+        given, units = _names_of(rows[block:top], rows[begin], sample, mark, width)
+        if not any(given) or len(given) == 1 < width:
             return None
-        names, units = found
-    skipped = sum(map(bool, rows[:begin])) - has_names
+        names = given if len(given) == width else []  # which is refused
+    skipped = sum(map(bool, rows[:begin])) - any(names)
     head = [row for row in rows[begin:] if row]
     may_lack_last = lacks or any(names) and not names[-1]
     return Dialect(mark or ",", names, begin, skipped, head, units, may_lack_last)
@@ -217,7 +226,8 @@ def _share(row: list[str], solid: Sequence[int], is_first: bool) -> float:
     counts = [str(number) for number in range(len(row))]
     is_word = len(first) > 3 and first.isalpha() and first.casefold() not in ("none", "null")
     is_named = is_word and is_first and 0 in solid and len({*others}) == len(others)
-    if others and (others in (counts[:-1], counts[1:]) or is_named) and not _SOLID.match(first):
+    has_digit = any(map(str.isdigit, first))
+    if others and (others in (counts[:-1], counts[1:]) or is_named) and not has_digit:
         return 0.0
     marks = [place < len(row) and bool(_SOLID.match(row[place])) for place in solid]
     return sum(marks) / max(1, len(solid))
@@ -237,8 +247,8 @@ def _begin_of(
     above = begin
     while above > 0 and not is_wide[above - 1] and shares[above - 1] > 0.5:
         above -= 1
-    is_below_names = 0 < above < begin and is_wide[above - 1] and shares[above - 1] == 0
-    return above if is_below_names else begin
+    is_below_names = above > 0 and is_wide[above - 1] and shares[above - 1] == 0
+    return above if is_below_names or not above else begin
 
 
 def _names_of(
@@ -247,9 +257,9 @@ def _names_of(
     sample: Sequence[Sequence[str]],
     mark: str,
     width: int,
-) -> tuple[list[str], Sequence[str]] | None:
-    """Returns the names and the units in a block of lines above the first row of data, or None if
-    columns of a sample of the data have none.
+) -> tuple[list[str], Sequence[str]]:
+    """Returns the names and the units in a block of lines above the first row of data; fewer names
+    than columns if a sample of the data has values in the others.
     """
     # the line of the most different names, of several the first
     header = max(range(len(block)), key=lambda number: len({*block[number]} - {""}))
@@ -261,8 +271,8 @@ def _names_of(
         # R writes quoted names, and none above the numbers of the rows
         elif below[0] == '"1"':
             given = ["", *(cell.strip('"') for cell in given)]
-    if not any(given) or any(any(row[len(given) :]) for row in sample):
-        return None
+    if any(any(row[len(given) :]) for row in sample):
+        return given, ()
     names = given + [""] * (width - len(given))
     # names in two lines, as under merged cells
     for row in (*block[:header], *block[header + 1 :]):
