@@ -380,6 +380,19 @@ READ = {
         table("date,time,v", stamps("%Y-%m-%d"), [f"{k.hour}:{k.minute}:0" for k in TIMES], VALUES),
         START,
     ),
+    "dates of PVGIS": (table("time,v", stamps("%Y%m%d:%H%M"), VALUES), START),
+    "beginning and end with a dash": (
+        table("time,v", stamps("%d.%m.%Y %H:%M - 01.04.2024 00:00"), VALUES),
+        START,
+    ),
+    "the time of TensorBoard": (
+        table("Wall time,Step,v", 1_709_251_200.5 + SECONDS, range(N), VALUES),
+        START + pd.Timedelta("0.5s"),
+    ),
+    "names in a comment above an empty one": (
+        table("# time,v\n#", UTC, VALUES),
+        START,
+    ),
     "NaN of C": (table("time,v", UTC, VALUES).replace(f",{VALUES[30]}\n", ",-nan(ind)\n"), START),
 }
 
@@ -703,6 +716,18 @@ REFUSED = {
     "no names above values that count": (
         table("@0:00,1,2", stamps("@%H:%M"), [1] * N, [2] * N),
         "--no-header",
+    ),
+    "a zone in letters in another column": (
+        table("gps,device,v", stamps("%a %b %d %H:%M:%S PDT %Y"), MINUTES, VALUES),
+        "PDT 2024",
+        {"options": Cleaning(timezone="UTC")},
+        60,
+    ),
+    "two tables": (
+        table("time,a,b", UTC, VALUES, VALUES, below=table("time,v", UTC, VALUES)),
+        f"--skip-rows {N + 1}",
+        {"options": Cleaning(skip_rows=N + 1)},
+        60,
     ),
     "a zone beside the table": (
         table("time,v", MINUTES, VALUES, above="zone\nEurope/Berlin\n\n"),
@@ -1270,6 +1295,13 @@ def test_a_channel_that_cannot_be_read_leaves_the_others_as_an_option(tmp_path, 
         read_telemetry(tmp_path / "a.csv", Cleaning(min_part=3))
     (telemetry,) = read_telemetry(tmp_path / "a.csv", Cleaning(min_part=3), ["v"])
     assert len(telemetry) == N
+
+
+def test_a_clock_that_begins_again_leaves_no_channel_as_an_option():
+    frame = pd.DataFrame({"t": [*range(N), *range(N)], "v": [*VALUES, *-VALUES], "w": 1.0})
+    with pytest.raises(InputError, match="begin again") as caught:
+        read_telemetry(frame)
+    assert caught.value.options == ({"time": "none"},)
 
 
 def test_words_that_repeat_times_are_states_on_request(refused):

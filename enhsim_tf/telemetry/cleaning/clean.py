@@ -32,7 +32,7 @@ from enhsim_tf.telemetry.series import (
     iso_time,
 )
 
-_FEW = 8  # channels that a message names
+_MAX_NAMES = 120  # characters of the names of channels that a message has
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,7 +150,8 @@ def clean_all(
     failed: dict[str, Exception] | None = None,
 ) -> dict[str, Cleaned]:
     """Cleans channels by their names. One that cannot be used goes into `failed` with its error;
-    without `failed`, the error is raised, and its last option names the other channels.
+    without `failed`, the error is raised, and its last option names the other channels, unless
+    they share what is wrong.
     """
     cleaned = {}
     errors: dict[str, InputError] = {}
@@ -165,8 +166,9 @@ def clean_all(
         failed.update(errors)
     elif errors:
         error = next(iter(errors.values()))
-        others = [{"columns": list(cleaned)}] if 0 < len(cleaned) <= _FEW else []
-        raise InputError(error.message, [*error.options, *others], error.otherwise) from None
+        is_short = 0 < sum(map(len, cleaned)) <= _MAX_NAMES
+        others = [{"columns": list(cleaned)}] if is_short and type(error) is InputError else []
+        raise type(error)(error.message, [*error.options, *others], error.otherwise) from None
     return cleaned
 
 

@@ -13,6 +13,7 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError, counted
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
+from enhsim_tf.telemetry.cleaning.times import ClockError
 from enhsim_tf.telemetry.windows import runs_of
 
 # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay
@@ -245,7 +246,7 @@ def _drop_duplicate_times(
         and options.interval_s is None
         and 4 * len(left) >= len(rows) > 3
     ):
-        raise InputError(
+        raise ClockError(
             f"Expected a time for each row. Received: {len(rows):,} rows of {name} with "
             f"{len(kept):,} different times, as of several series, or of a clock that lost digits.",
             [{"interval_s": float(f"{np.median(np.diff(kept['time'])) / 1e9:.6g}")}]

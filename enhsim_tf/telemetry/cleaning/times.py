@@ -74,6 +74,10 @@ _YEAR_FIRST = re.compile(rf"\d{{4}}(?P<mark>[./-])\d\d?(?P=mark)\d\d?{_END}")
 _GUESSED = re.compile(r"[A-Za-z]{3}|^\d{4}[/.]")
 
 
+class ClockError(InputError):
+    """Raised where the clock, which other channels share, cannot be used."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Times:
     """Parsed times."""
@@ -465,6 +469,8 @@ def _plain(text: pd.Series) -> pd.Series:
     return (
         text.str.strip()
         .str.replace(r"^(\d{4}-\d\d-\d\dT[^/]*)/.*", r"\1", regex=True)
+        .str.replace(r"^(\d.*:\d\d) - \d.*:\d\d.*", r"\1", regex=True)
+        .str.replace(r"^(\d{8}):(\d{4})$", r"\1T\2", regex=True)
         .str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True)
         .str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
         .str.replace(r"(?<=[T :])(\d)(?=:\d|\.\d|$)", r"0\1", regex=True)
@@ -593,7 +599,7 @@ def refuse_steps_back(
             otherwise = "the parts one by one"
             otherwise += ", or same_time='last' if rows correct earlier ones" if has_zone else ""
     if len(back):
-        raise InputError(
+        raise ClockError(
             f"Expected ascending times. Received: times that {how}, at "
             f"{log.place(rows[back[0] + 1])} of {name}.",
             options,

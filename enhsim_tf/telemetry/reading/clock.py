@@ -295,6 +295,9 @@ def offset_of(
         for each in _PLACE.findall(f"{named} {above}")
         if each in zoneinfo.available_timezones()
     ]
+    head = frame.iloc[:LOOK]
+    texts = [str(cell) for name in frame if is_text(head[name]) for cell in head[name].dropna()[:1]]
+    beside += [text for text in texts if re.search(r"\d:\d\d", text) and _ZONE.search(text)]
     is_named = places or _ZONE.search(named)
     if zone is None and (is_named or beside and "utc" not in named.casefold()):
         raise InputError(

@@ -14,7 +14,7 @@ BESIDE = set(
     "absolute system sample sampling event log logger "
     "record recorded received created at in begin boot experiment test server day julian "
     "modified excel serial number "
-    "step ref reference header stamp end stop".split()
+    "wall step ref reference header stamp end stop".split()
 )
 _ENDS = set("end ende stop finish until bis to fin hasta tot".split())  # of an interval
 UNITS = {

@@ -20,6 +20,7 @@ _SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal sign
 _HEAD_LINES = 300
 HEAD = 4_000_000
 _LOOK = 50  # columns that are inspected
+_FEWEST_ROWS = 10  # with numbers above the names, below which they are no table
 csv.field_size_limit(HEAD)  # with another separator than its own, a line is one cell
 _NUMBER = (
     r"(?:[+-] *)?(?:\d[\d.,'\u2019 \u00a0\u202f]*|[.,]\d+)(?:[de][+-]?\d+)?"
@@ -148,6 +149,23 @@ def _refuse_header(found: Dialect, lines: Sequence[str], name: str) -> NoReturn:
         [{"no_header": True}],
         "a line of names on top",
     )
+
+
+def refuse_other_table(text: str, found: Dialect, name: str, skip_rows: int) -> None:
+    """Refuses a text in which another table stands above the one that was found."""
+    rows = _split(text.split("\n", found.first_line)[: found.first_line], found.separator)
+    of_data = [
+        number
+        for number, row in enumerate(rows)
+        if len(row) > 1 and 2 * sum(bool(_SOLID.match(cell)) for cell in row) > len(row)
+    ]
+    if len(of_data) >= _FEWEST_ROWS:
+        raise InputError(
+            f"Expected one table. Received: {len(of_data)} lines with numbers above the names of "
+            f"another table in {name}.",
+            [{"skip_rows": skip_rows + of_data[-1] + 1}],
+            "each table as a file",
+        )
 
 
 def _is_content(line: str) -> bool:
@@ -296,7 +314,7 @@ def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
     comments = [
         line.lstrip("#%").strip()
         for line in lines[: found.first_line]
-        if line.startswith(("#", "%"))
+        if line.startswith(("#", "%")) and line.strip("#% ")
     ]
     if not comments:
         return None

@@ -23,7 +23,15 @@ from enhsim_tf.telemetry.cleaning.numbers import (
 )
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import ROWS, Finding, Places
-from enhsim_tf.telemetry.reading.dialect import BLANKS, HEAD, Dialect, behind, find_dialect, utf8_of
+from enhsim_tf.telemetry.reading.dialect import (
+    BLANKS,
+    HEAD,
+    Dialect,
+    behind,
+    find_dialect,
+    refuse_other_table,
+    utf8_of,
+)
 
 _HEAD = 100_000  # bytes that are searched for blanks before cells
 _LOOK = 2_000  # cells of a column that are searched for a decimal comma
@@ -90,6 +98,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     if _ANNOTATION.search(head[:10_000]):
         return _read_annotated(text.decode(), name, findings)
     dialect = find_dialect(head, name, options.no_header)
+    refuse_other_table(head, dialect, name, options.skip_rows)
     if dialect.skipped:
         findings.append(
             Finding(
