@@ -156,7 +156,8 @@ def _read_array(
         )
     if array.dtype == bool and options.states:
         array = array.astype(np.float64)
-    stem = re.split(r"\.npy", path.name, flags=re.IGNORECASE)[0]
+    stem = re.sub(r"\.npy(?:\.\w+)?$", "", path.name, flags=re.IGNORECASE)
+    columns = columns and [column.removeprefix(f"{stem}.") for column in columns]
     known = {str(number): number for number in range(array.shape[1])}
     last = array.shape[1] - 1
     found = {}

@@ -208,6 +208,10 @@ def test_files_of_other_units_or_zones_are_not_joined(tmp_path, refused):
     times = pd.date_range("2024", periods=N, freq="s")
     for name, zone in (("a", "UTC"), ("b", None)):
         FRAME.assign(time=times.tz_localize(zone)).to_parquet(tmp_path / f"{name}.parquet")
+    missing = FRAME.assign(volts=pd.array([pd.NA] * N, "Int64"))
+    missing.to_parquet(tmp_path / "e.parquet")
+    FRAME.assign(volts=1, time=SECONDS + N).to_parquet(tmp_path / "f.parquet")
+    assert len(read_source([tmp_path / f"{name}.parquet" for name in "ef"])["amps"].cells) == 2 * N
     for ending, factor in (("c", 1), ("d", 1_000)):
         since = 1_709_251_200 + np.arange(N)
         FRAME.assign(time=factor * since).to_parquet(tmp_path / f"{ending}.parquet")

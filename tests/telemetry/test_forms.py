@@ -1277,8 +1277,8 @@ def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused)
 
 
 def test_few_different_numbers_with_one_unit_are_numbers():
-    parsed, bad, _ = parse_numbers(["960 hPa", "961 hPa"], "")
-    assert parsed.tolist() == [960, 961] and not bad.any()
+    parsed, bad, _ = parse_numbers(["960.5 hPa", "961.0 hPa"], "")
+    assert parsed.tolist() == [960.5, 961] and not bad.any()
 
 
 def test_a_blank_last_line_leaves_row_numbers_what_they_are(tmp_path):
@@ -1295,6 +1295,66 @@ def test_a_channel_that_cannot_be_read_leaves_the_others_as_an_option(tmp_path, 
         read_telemetry(tmp_path / "a.csv", Cleaning(min_part=3))
     (telemetry,) = read_telemetry(tmp_path / "a.csv", Cleaning(min_part=3), ["v"])
     assert len(telemetry) == N
+
+
+HALVES = [f'"{20 + k % 3},{5 * (k % 2)}"' for k in range(N)]
+# form: text, its channels
+ORDINARY = {
+    "a line above the names": (table("time,v", UTC, VALUES, above="Rate,100\n"), ["v"]),
+    "depths that tell series apart": (
+        table("time,depth,v", UTC.repeat(2), ["10 cm", "20 cm"] * N, range(2 * N)),
+        ["10 cm", "20 cm"],
+    ),
+    "numbers with two colons": (
+        table("date,port,v", stamps("%Y-%m-%d %H:%M"), [f"0:1:{k % 7}" for k in range(N)], VALUES),
+        ["v"],
+    ),
+    "decimals in steps of a half": (
+        table("time,v,w", UTC, HALVES, [f'"{v}"' for v in commas(VALUES)]),
+        ["v", "w"],
+    ),
+    "a sentence with a comma above blanks": (
+        table("t v", commas(SECONDS + 0.5), commas(VALUES), separator=" ", above="Hall, 2\n"),
+        ["v"],
+    ),
+    "names with decimal commas around": (
+        table("time, s\tv, V", SECONDS, commas(VALUES), separator="\t"),
+        ["v, V"],
+    ),
+    "a place beside times in UTC": (
+        table("time (UTC),v", MINUTES, VALUES, above="# at Europe/Berlin\n"),
+        ["v"],
+    ),
+    "ends of intervals since 1970": (
+        table("open_time,close_time,v", UTC, 1_709_254_799 + SECONDS, VALUES),
+        ["v"],
+    ),
+    "limits of channels above the names": (
+        table("time,v", UTC, VALUES, above="".join(f"c{k},-10,10\n" for k in range(12))),
+        ["v"],
+    ),
+}
+
+
+@pytest.mark.parametrize("form", ORDINARY)
+def test_an_ordinary_form_is_taken_for_no_odd_one(tmp_path, form):
+    text, names = ORDINARY[form]
+    (tmp_path / "a.csv").write_text(text)
+    assert list(read_source(tmp_path / "a.csv")) == names
+
+
+@pytest.mark.parametrize("text", ["time,v", "time v", '"time"'])
+def test_names_without_an_end_are_no_table(tmp_path, refused, text):
+    (tmp_path / "a.csv").write_text(text)
+    with refused("rows below the header"):
+        read_source(tmp_path / "a.csv")
+
+
+def test_the_hour_goes_before_that_in_which_an_interval_ends():
+    times = pd.date_range(START, periods=N, freq="h")
+    frame = {"date": times.strftime("%Y-%m-%d"), "Hour Ending": times.hour + 1, "hour": times.hour}
+    channels = read_source(pd.DataFrame(frame | {"v": VALUES}))
+    assert clean(channels["v"]).telemetry.start == "2024-03-01T00:00:00+00:00"
 
 
 def test_a_clock_that_begins_again_leaves_no_channel_as_an_option():

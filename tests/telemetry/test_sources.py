@@ -89,6 +89,14 @@ def test_a_packed_array_is_read(tmp_path):
     assert read_source(tmp_path / "a.npy.gz")["a"].cells.tolist() == VALUES.tolist()
 
 
+def test_columns_of_an_array_are_named_as_their_channels(tmp_path, refused):
+    np.save(tmp_path / "a.npy", np.column_stack([VALUES, np.full(N, np.nan), VALUES]))
+    with refused("--column a.0 --column a.2"):
+        read_telemetry(tmp_path / "a.npy")
+    (telemetry,) = read_telemetry(tmp_path / "a.npy", columns=["a.0", "a.2"])
+    assert telemetry.columns == ("a.0", "a.2")
+
+
 def test_commands_are_no_channels_unless_they_are_named(tmp_path):
     # one command after the other
     sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(float)

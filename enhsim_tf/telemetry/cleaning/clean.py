@@ -20,7 +20,12 @@ from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.regular_grid import regularise
 from enhsim_tf.telemetry.cleaning.report import CleaningLog, Finding, Report
-from enhsim_tf.telemetry.cleaning.times import Times, localize_times, refuse_steps_back
+from enhsim_tf.telemetry.cleaning.times import (
+    ClockError,
+    Times,
+    localize_times,
+    refuse_steps_back,
+)
 from enhsim_tf.telemetry.series import (
     COUNTED,
     DATES,
@@ -151,7 +156,7 @@ def clean_all(
 ) -> dict[str, Cleaned]:
     """Cleans channels by their names. One that cannot be used goes into `failed` with its error;
     without `failed`, the error is raised, and its last option names the other channels, unless
-    they share what is wrong.
+    they share what is wrong: their clock.
     """
     cleaned = {}
     errors: dict[str, InputError] = {}
@@ -161,14 +166,16 @@ def clean_all(
             check_values(usable.telemetry.values[:, 0], name)
             cleaned[name] = usable
         except InputError as error:
+            if failed is None and isinstance(error, ClockError):
+                raise
             errors[name] = error
     if failed is not None:
         failed.update(errors)
     elif errors:
         error = next(iter(errors.values()))
         is_short = 0 < sum(map(len, cleaned)) <= _MAX_NAMES
-        others = [{"columns": list(cleaned)}] if is_short and type(error) is InputError else []
-        raise type(error)(error.message, [*error.options, *others], error.otherwise) from None
+        others = [{"columns": list(cleaned)}] if is_short else []
+        raise InputError(error.message, [*error.options, *others], error.otherwise) from None
     return cleaned
 
 

@@ -266,10 +266,11 @@ def _without_unit(text: pd.Series) -> tuple[pd.Series, str]:
     if not len(found):
         return text, ""
     has_it = text.str.endswith(found.iloc[0]).to_numpy(bool)
-    # words: 2a, or 10 cm and large
+    has_marks = text.str.contains(r"\d[.,]\d|[%\u00b0]").any()
+    # words: 10 cm or 2a
     if (
         has_it.sum() <= len(text) / 2
-        or text[has_it].nunique() <= (1 if has_it.all() else 10)
+        or text[has_it].nunique() <= (1 if has_marks else 10)
         or not text.str.contains("[., %\u00b0]").any()
     ):
         return text, ""

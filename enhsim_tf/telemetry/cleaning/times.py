@@ -55,11 +55,13 @@ DURATION = (
 """Pattern of a time span as text, such as `0.5 sec`, `1 days 00:00:01` and `PT90S`."""
 _ISO = "ISO8601"
 _COMPACT = {7: "%Y%j", 8: "%Y%m%d", 10: "%Y%m%d%H", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
+_ANY_DATE = r"\d{1,4}[./-]\d\d?[./-]\d{1,4} "
 _MIDNIGHT = r"(?<=[T ])24(?=:00)"  # at the end of a day
 LOOK = 200  # number of cells that are inspected to find a form
 _MAX_JUMPS = 100  # above which times are in no order
 TIME_OF_DAY = (
-    r"(?P<time>\d\d?:(?:\d\d|\d(?=:\d))(?P<seconds>:\d\d?(?P<fraction>[.,]\d+)?)?)"
+    r"(?P<time>\d\d?:(?:\d\d|\d(?=:\d\d))"
+    r"(?P<seconds>:(?:\d\d|(?<=\d\d:)\d(?!\d))(?P<fraction>[.,]\d+)?)?)"
     r"(?P<half> ?[AaPp][Mm])?"
 )
 # more than a day; 24:00:00 may be its end
@@ -469,7 +471,7 @@ def _plain(text: pd.Series) -> pd.Series:
     return (
         text.str.strip()
         .str.replace(r"^(\d{4}-\d\d-\d\dT[^/]*)/.*", r"\1", regex=True)
-        .str.replace(r"^(\d.*:\d\d) - \d.*:\d\d.*", r"\1", regex=True)
+        .str.replace(rf"^({_ANY_DATE}.*:\d\d) - {_ANY_DATE}.*", r"\1", regex=True)
         .str.replace(r"^(\d{8}):(\d{4})$", r"\1T\2", regex=True)
         .str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True)
         .str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)

@@ -17,7 +17,6 @@ from enhsim_tf.telemetry.cleaning.numbers import (
     format_cell,
     is_missing,
     is_text,
-    parse_numbers,
 )
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
@@ -155,8 +154,10 @@ def read_table_channels(
 
 
 def _has_numbers(table: Table, column: str, rows: np.ndarray) -> bool:
-    cells = table.frame[column].iloc[rows].drop_duplicates()
-    return bool(np.isfinite(parse_numbers(cells, "", drop=True, decimal=table.decimal)[0]).any())
+    cells = table.frame[column].iloc[rows].dropna()
+    return bool(len(cells)) and (
+        not is_text(cells) or bool(cells.astype("str").str.contains(r"\d").any())
+    )
 
 
 def _is_state(cells: pd.Series) -> bool:

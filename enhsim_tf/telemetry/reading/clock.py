@@ -61,6 +61,7 @@ _FACTOR = re.compile(
 _PLACE = re.compile(r"\b[A-Z][a-z]+/[A-Z]\w+\b")  # as Europe/Berlin
 _ZONE = re.compile(r"\b(?:CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b")
 _TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(?!\d).*"
+_WITH_YEAR = re.compile(r"\d:\d\d.*\b20\d\d|\b20\d\d.*\d:\d\d")
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
 _ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
 
@@ -210,6 +211,7 @@ def _refuse_unknown(
         for name, values in numbers.items()
         if is_regular(values)
         or is_unnamed(name)
+        and "column 1" not in kinds  # no column has a name
         and is_increasing(values)
         and np.nanmax(values % 1) > 0
     ]
@@ -290,16 +292,13 @@ def offset_of(
         for name in frame
         if _ZONE_COLUMN.search(name) or name.casefold() == "tz" and is_text(frame[name])
     ]
-    places = [
-        each
-        for each in _PLACE.findall(f"{named} {above}")
-        if each in zoneinfo.available_timezones()
-    ]
+    said = set(_PLACE.findall(f"{named} {above}"))
+    places = sorted(said & zoneinfo.available_timezones()) if said else []
     head = frame.iloc[:LOOK]
     texts = [str(cell) for name in frame if is_text(head[name]) for cell in head[name].dropna()[:1]]
-    beside += [text for text in texts if re.search(r"\d:\d\d", text) and _ZONE.search(text)]
-    is_named = places or _ZONE.search(named)
-    if zone is None and (is_named or beside and "utc" not in named.casefold()):
+    beside += [text for text in texts if _WITH_YEAR.search(text) and _ZONE.search(text)]
+    is_utc = "utc" in named.casefold()
+    if zone is None and (_ZONE.search(named) or (places or beside) and not is_utc):
         raise InputError(
             "Expected times that state their zone. Received: "
             f"{', '.join(dict.fromkeys([named, *beside, *places]))} in {what}, where a zone is "
@@ -313,7 +312,7 @@ def offset_of(
 def refuse_other_zone(times: Times, numbers: Mapping[str, np.ndarray], what: str) -> None:
     """Refuses dates without a zone that numbers since 1970 show in another zone than UTC."""
     for name, values in numbers.items():
-        if is_epoch(values):
+        if is_epoch(values) and name_tells(name)[0] == 2:
             unit = epoch_unit(float(np.nanmedian(values)))
             stamps = pd.to_datetime(values, unit=unit, errors="coerce")
             apart = abs((stamps - times.stamps).median())

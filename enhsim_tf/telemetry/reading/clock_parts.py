@@ -171,7 +171,10 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     plain = {name: re.sub(r"\W|_", "", name.casefold()) for name in numbers}
-    for name, word in plain.items():
+    # `hour` goes before `hour ending`
+    for name, word in sorted(
+        plain.items(), key=lambda item: item[1].startswith("hour") and len(item[1])
+    ):
         part = _PART_OF.get(word)
         # the second of `MM` and `mm`
         if word == "mm" and {"month", "doy"} & set(found):

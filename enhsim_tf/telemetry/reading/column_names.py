@@ -4,17 +4,17 @@ import re
 
 _TIMES = set(
     "time times timestamp timestamps datetime date dates epoch elapsed simtime tout unix unixtime "
-    "utc utcg ts clock mjd jd datenum uptime "
+    "utc utcg posix ts clock mjd jd datenum uptime "
     "seconds secs millis milliseconds microseconds nanoseconds minutes hours days zeit zeitstempel "
     "zeitpunkt datum uhrzeit sekunden "
-    "temps heure horodatage tiempo fecha hora tempo tijd hhmm hhmmss".split()
+    "temps heure horodatage tiempo fecha hora tempo tijd".split()
 )
 BESIDE = set(
     "since start of run the from local gmt cet sim simulation simulated mission rel relative abs "
     "absolute system sample sampling event log logger "
     "record recorded received created at in begin boot experiment test server day julian "
     "modified excel serial number "
-    "wall step ref reference header stamp end stop".split()
+    "step ref reference header stamp end stop".split()
 )
 _ENDS = set("end ende stop finish until bis to fin hasta tot".split())  # of an interval
 UNITS = {
@@ -47,7 +47,8 @@ def name_tells(name: str) -> tuple[int, str | None]:
     """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit
     or kind of days that it states.
     """
-    if re.fullmatch(r"x_value(?:\.\d+)?|x-axis", name.casefold().strip()):  # of LabVIEW and scopes
+    # of LabVIEW, scopes and TensorBoard
+    if re.fullmatch(r"x_value(?:\.\d+)?|x-axis|wall time", name.casefold().strip()):
         return 2, None
     words = words_of(name)
     unit = next((UNIT_OF[word] for word in reversed(words) if word in UNIT_OF), None)

@@ -30,6 +30,7 @@ _DATE = (
     r"\d{1,4}[-/.: ]\d.*|\d{8}T.*|\d{1,2}[-/ ][a-z]{3}.*|"
     r"(?:[a-z]{3}, )?\d{1,2} [a-z]{3} .*|[a-z]{3}\.? +\d{1,2},? +\d.*"
 )
+_PLAIN = re.compile(r"\d+(?:\.\d+)?").fullmatch
 _FORMAT = re.compile(r"\d+[sdn]").fullmatch
 _SOLID = re.compile(f"(?:{_NUMBER}|{_DATE}|[+-]?inf(?:inity)?)$", re.IGNORECASE)
 
@@ -105,21 +106,21 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
     layouts = [_lay_out(mark, lines, no_header) for mark in separator or _SEPARATORS]
     found = [layout for layout in layouts if layout and len(layout.names) > 1]
     if not found:
-        for layout in layouts:
-            if layout and not layout.names:
-                _refuse_header(layout, lines, name)
         by_blanks, single = (_lay_out(mark, lines, no_header) for mark in (BLANKS, _WHOLE))
         has_blanks = by_blanks is not None and len(by_blanks.names) > 1
+        for layout in layouts:  # with too few names; decimal commas may seem to be separators
+            if layout and not (layout.names or has_blanks and layout.separator == ","):
+                _refuse_header(layout, lines, name)
         found = [by_blanks if has_blanks else single]
     if found == [None]:
         raise ValueError("lines of different lengths")
-    marks = [layout.separator for layout in found]
-    # no names are those that all hold another separator of the data
+    marks = {layout.separator for layout in found} - {","}
+    # cells between decimal commas hold the separator
     with_header = [
         layout
         for layout in found
         if any(layout.names)
-        and not any(all(mark in name for name in layout.names if name) for mark in marks)
+        and (layout.separator != "," or marks.isdisjoint("".join(sum(layout.head[:1], []))))
     ]
     best = max(with_header, key=lambda layout: len(layout.names), default=found[0])
     if not with_header and not no_header:
@@ -135,7 +136,7 @@ def _refuse_header(found: Dialect, lines: Sequence[str], name: str) -> NoReturn:
     """Refuses data without a line of names above it, or with one of another number of names."""
     above = [number for number in range(found.first_line) if _is_content(lines[number])]
     cells = _split(lines[above[-1] : above[-1] + 1], found.separator)[0] if above else []
-    width = len(found.head[0])
+    width = len(found.names) or len(found.head[0])
     marks = found.separator != BLANKS
     if marks and 1 < len(cells) != width and not any(map(_SOLID.match, cells)):
         raise InputError(
@@ -157,7 +158,7 @@ def refuse_other_table(text: str, found: Dialect, name: str, skip_rows: int) -> 
     of_data = [
         number
         for number, row in enumerate(rows)
-        if len(row) > 1 and 2 * sum(bool(_SOLID.match(cell)) for cell in row) > len(row)
+        if len(row) > 1 and 4 * sum(bool(_SOLID.match(cell)) for cell in row) >= 3 * len(row)
     ]
     if len(of_data) >= _FEWEST_ROWS:
         raise InputError(
@@ -203,7 +204,11 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
     sample = [row for row in last if len(row) == width]
     solid = [place for place in range(min(width, _LOOK)) if _is_solid(sample, place)]
 
-    shares = [_share(row, solid, row is filled[0]) for row in rows]
+    shares = [_share(row, solid) for row in rows]
+    first, *second = filled[:2]
+    is_above_data = all(_share(row, solid) > 0.5 for row in second)
+    if 0 in solid and is_above_data and _are_rising_names(first):
+        shares[rows.index(first)] = 0.0
     begin = _begin_of(rows, shares, width, otherwise=rows.index(filled[0]) + (not no_header))
     # of a last column that is mostly left out
     lacks = begin > 0 and len(rows[begin - 1]) == width + 1 and shares[begin - 1] == 0
@@ -220,10 +225,11 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
         block -= 1
     names = [""] * width
     units: Sequence[str] = ()
+    below = rows[begin] if begin < len(rows) else []
     if block < top and no_header:
         begin = block
     elif block < top:
-        given, units = _names_of(rows[block:top], rows[begin], sample, mark, width)
+        given, units = _names_of(rows[block:top], below, sample, mark, width)
         if not any(given) or len(given) == 1 < width:
             return None
         names = given if len(given) == width else []  # which is refused
@@ -233,22 +239,26 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
     return Dialect(mark or ",", names, begin, skipped, head, units, may_lack_last)
 
 
-def _share(row: list[str], solid: Sequence[int], is_first: bool) -> float:
+def _share(row: list[str], solid: Sequence[int]) -> float:
     """Share of the columns of numbers and dates that hold one in a row, none if its cells are names
-    that count, as in `,0,1`, numbers behind a name, as in `time,31.5,63` in the first row, or
-    formats, as `5s` and `20d` of the USGS.
+    that count, as in `,0,1`, or formats, as `5s` and `20d` of the USGS.
     """
     if row and all(map(_FORMAT, row)):
         return 0.0
     first, *others = row or [""]
     counts = [str(number) for number in range(len(row))]
-    is_word = len(first) > 3 and first.isalpha() and first.casefold() not in ("none", "null")
-    is_named = is_word and is_first and 0 in solid and len({*others}) == len(others)
-    has_digit = any(map(str.isdigit, first))
-    if others and (others in (counts[:-1], counts[1:]) or is_named) and not has_digit:
+    if others and others in (counts[:-1], counts[1:]) and not any(map(str.isdigit, first)):
         return 0.0
     marks = [place < len(row) and bool(_SOLID.match(row[place])) for place in solid]
     return sum(marks) / max(1, len(solid))
+
+
+def _are_rising_names(row: Sequence[str]) -> bool:
+    """Whether a row has words, of which one is first, and numbers that rise: `time,31.5,63`."""
+    numbers = [cell for cell in row if _PLAIN(cell)]
+    is_rising = all(float(one) < float(other) for one, other in itertools.pairwise(numbers))
+    words = [cell for cell in row if not _PLAIN(cell)]
+    return is_rising and len(numbers) > 1 and row[:1] == words[:1] and all(map(str.isalpha, words))
 
 
 def _begin_of(
@@ -282,7 +292,7 @@ def _names_of(
     # the line of the most different names, of several the first
     header = max(range(len(block)), key=lambda number: len({*block[number]} - {""}))
     given = block[header]
-    if mark == BLANKS and len(given) == width - 1:
+    if mark == BLANKS and below and len(given) == width - 1:
         # a date and a time of day below one name
         if len(given) > 1 and ":" in below[1]:
             given = ["", *given]

@@ -18,6 +18,7 @@ from enhsim_tf.telemetry.cleaning.numbers import is_plain
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.cleaning.times import epoch_unit
+from enhsim_tf.telemetry.reading.column_names import name_tells
 from enhsim_tf.telemetry.reading.formats import HAS_TABLES, READERS, read_any_text
 from enhsim_tf.telemetry.reading.text_files import Table
 from enhsim_tf.telemetry.source_kinds import PACKED, SOURCES
@@ -136,8 +137,10 @@ def _with_plain_columns(table: Table, name: str) -> Table:
 
 
 def _epoch_unit_of(cells: pd.Series) -> str | None:
-    """Returns the unit in which numbers may be times since 1970."""
-    return epoch_unit(float(cells.median())) if is_plain(cells) else None
+    """Returns the unit in which a clock may hold times since 1970."""
+    if not is_plain(cells) or name_tells(str(cells.name))[0] == 0 or not cells.notna().any():
+        return None
+    return epoch_unit(float(cells.median()))
 
 
 def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:

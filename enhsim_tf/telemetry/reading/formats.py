@@ -70,8 +70,8 @@ def read_json(content: bytes, name: str, options: Cleaning) -> Table:
         with reading(name):
             lists = _lists_of(records[0])
         if lists:
-            above = " ".join(value for value in records[0].values() if isinstance(value, str))
-            return dataclasses.replace(_of_arrays(lists, name, options), above=above)
+            zone = str(records[0].get("timezone", ""))
+            return dataclasses.replace(_of_arrays(lists, name, options), above=zone)
         names = ", ".join(records[0])
         raise InputError(
             f"Expected records, one in each line, or a list of them. Received: one record in "
@@ -256,7 +256,10 @@ def read_hdf5(content: bytes, name: str, options: Cleaning) -> Table:
             )
         values = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
         if item.attrs.get("MATLAB_class") == b"char":
-            arrays[parent, key] = np.array(["".join(map(chr, row)) for row in values.T], object)
+            rows = values.T if values.ndim == 2 and values.dtype == np.uint16 else ()
+            texts = ["".join(map(chr, row)) for row in rows]
+            if texts and re.match(r"\d+[-/.:]\d", texts[0]):  # others are names and notes
+                arrays[parent, key] = np.array(texts, object)
         elif values.dtype.names:
             arrays.update({(path, field): values[field] for field in values.dtype.names})
         else:  # MATLAB's axes are in reverse order

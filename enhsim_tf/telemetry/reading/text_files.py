@@ -214,7 +214,7 @@ def _read_rows(
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
     sign = decimal or ("," if any(shows_comma(_some(head[column])) for column in head) else None)
     if dialect.separator == "," and decimal is None:
-        _refuse_flags(head, names, name)
+        _refuse_flags(head, name)
     if sign is None and dialect.separator == ";":
         sign = _sign_of_country(head, names, name)
     frame = _parse(data, dialect, sign)
@@ -256,22 +256,24 @@ def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str
     return "," if not pointed and any(has_commas(cells) for cells in columns) else None
 
 
-def _refuse_flags(head: pd.DataFrame, names: Sequence[str], name: str) -> None:
-    """Refuses numbers with a digit behind a comma that hardly varies, as the flag of quality that
-    weather services write behind a value.
+def _refuse_flags(head: pd.DataFrame, name: str) -> None:
+    """Refuses whole numbers with a digit behind a comma that hardly varies, as the flag of quality
+    that weather services write behind a value.
     """
-    digits = head.apply(
-        lambda cells: cells.str.extract(r"^[+-]?(?:0|[1-9]\d*),(\d)$", expand=False)
-    )
-    for column in digits:
-        found = digits[column].dropna()
-        if len(found) >= _FEWEST_FLAGS and found.nunique() <= _MAX_FLAGS:
-            raise InputError(
-                f"Expected one number in each cell. Received: {head[column][found.index[0]]!r} in "
-                f"{names[column]!r} of {name}, which may be a number and a flag.",
-                (),
-                "values and flags in columns of their own, or --decimal , if it is a decimal",
-            )
+    cells = pd.concat([head[column] for column in head])
+    behind = cells.str.extract(r"^[+-]?\d+,(\d+)$", expand=False).dropna()
+    found = cells[cells.str.fullmatch(r"[+-]?[1-9]\d{2,},\d").to_numpy(bool)]
+    if (
+        len(found) >= _FEWEST_FLAGS
+        and set(behind.str.len()) == {1}
+        and behind.nunique() <= _MAX_FLAGS
+    ):
+        raise InputError(
+            f"Expected one number in each cell. Received: {found.iloc[0]!r} in {name}, which may "
+            "be a number and a flag.",
+            (),
+            "values and flags in columns of their own, or --decimal , if it is a decimal",
+        )
 
 
 def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
