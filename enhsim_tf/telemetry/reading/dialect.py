@@ -103,7 +103,8 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         separator = stated[1]
     if not any(map(_is_content, lines)):
         raise ValueError("it is empty")
-    layouts = [_lay_out(mark, lines, no_header) for mark in separator or _SEPARATORS]
+    marks = [mark for mark in separator or _SEPARATORS if any(mark in line for line in lines)]
+    layouts = [_lay_out(mark, lines, no_header) for mark in marks]
     found = [layout for layout in layouts if layout and len(layout.names) > 1]
     if not found:
         by_blanks, single = (_lay_out(mark, lines, no_header) for mark in (BLANKS, _WHOLE))
@@ -114,13 +115,13 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         found = [by_blanks if has_blanks else single]
     if found == [None]:
         raise ValueError("lines of different lengths")
-    marks = {layout.separator for layout in found} - {","}
+    others = {layout.separator for layout in found} - {","}
     # cells between decimal commas hold the separator
     with_header = [
         layout
         for layout in found
         if any(layout.names)
-        and (layout.separator != "," or marks.isdisjoint("".join(sum(layout.head[:1], []))))
+        and (layout.separator != "," or others.isdisjoint("".join(sum(layout.head[:1], []))))
     ]
     best = max(with_header, key=lambda layout: len(layout.names), default=found[0])
     if not with_header and not no_header:
