@@ -26,7 +26,7 @@ from enhsim_tf.telemetry.reading.clock_values import is_regular
 from enhsim_tf.telemetry.reading.files import suffix_of, unpack
 from enhsim_tf.telemetry.reading.formats import refuse_channels_first
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.source_kinds import existing
+from enhsim_tf.telemetry.source_kinds import PACKED, existing
 
 _NUM_COLUMNS = (25, 55)  # of the published arrays with commands: SMAP, MSL
 
@@ -134,8 +134,9 @@ def _read_array(
             "out."
         )
     with reading(path.name):
-        # unpickling could run code
-        array = np.load(io.BytesIO(unpack(path)[0]), allow_pickle=False)
+        is_packed = path.suffix.lower() in PACKED
+        file = io.BytesIO(unpack(path)[0]) if is_packed else path
+        array = np.load(file, allow_pickle=False)  # unpickling could run code
     if not isinstance(array, np.ndarray) or array.dtype.kind in "SUV":
         raise InputError(
             f"Expected a NumPy array of numbers. Received: an archive, text or records in "

@@ -130,6 +130,19 @@ def test_words_are_channels_of_zero_and_one_on_request(tmp_path, refused):
     np.testing.assert_array_equal(telemetry.values[:, 2], mode == "RUN")
 
 
+def test_a_zone_above_the_table_of_a_sheet_is_asked_for(tmp_path, refused):
+    book = openpyxl.Workbook()
+    times = pd.date_range("2024-03-01", periods=N, freq="min")
+    rows = zip(times, VALUES.tolist(), strict=True)
+    for row in (["zone"], ["Europe/Berlin"], ["time", "volts"], *rows):
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    with refused("--timezone Europe/Berlin"):
+        read_telemetry(tmp_path / "a.xlsx")
+    (telemetry,) = read_telemetry(tmp_path / "a.xlsx", Cleaning(timezone="Europe/Berlin"))
+    assert telemetry.start == "2024-02-29T23:00:00+00:00"
+
+
 def test_deep_json_is_refused(tmp_path, refused):
     for name, text in (("a.jsonl", "[" * 100_000), ("b.json", json.dumps({"a": 1})[:-1])):
         (tmp_path / name).write_text(text)

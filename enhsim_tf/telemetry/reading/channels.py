@@ -111,8 +111,9 @@ def read_table_channels(
         chosen = _name_series(
             table.frame, keys, [name for name in layout.channels if name not in keys], what
         )
-        empty = [name for name, place in chosen.items() if not _has_numbers(table, *place)]
-        if columns is None and empty:
+        if columns is None and (
+            empty := [name for name, place in chosen.items() if not _has_numbers(table, *place)]
+        ):
             chosen = {name: place for name, place in chosen.items() if name not in empty}
             text = f"series without numbers: {', '.join(empty[:8])}"
             findings.append(Finding("columns left out", len(empty), text))

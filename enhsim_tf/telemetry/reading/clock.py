@@ -19,7 +19,6 @@ from enhsim_tf.telemetry.cleaning.times import (
     LOOK,
     Times,
     compact_form,
-    epoch_unit,
     may_be_time_of_day,
     parse_times,
     refuse_two_meanings,
@@ -33,6 +32,7 @@ from enhsim_tf.telemetry.reading.clock_parts import (
 )
 from enhsim_tf.telemetry.reading.clock_values import (
     FEWEST,
+    epoch_unit_of,
     is_epoch,
     is_increasing,
     is_nearly,
@@ -287,6 +287,8 @@ def offset_of(
     named = " ".join(clock.columns)
     if found := re.search(r"(?<!Etc/)\b(?:UTC|GMT) ?([+-]\d\d?)(?::?(\d\d))?\b", named):
         return pd.Timedelta(f"{found[1]}:{found[2] or '00'}:00")
+    if zone is not None:
+        return None
     beside = [
         name
         for name in frame
@@ -298,7 +300,7 @@ def offset_of(
     texts = [str(cell) for name in frame if is_text(head[name]) for cell in head[name].dropna()[:1]]
     beside += [text for text in texts if _WITH_YEAR.search(text) and _ZONE.search(text)]
     is_utc = "utc" in named.casefold()
-    if zone is None and (_ZONE.search(named) or (places or beside) and not is_utc):
+    if _ZONE.search(named) or (places or beside) and not is_utc:
         raise InputError(
             "Expected times that state their zone. Received: "
             f"{', '.join(dict.fromkeys([named, *beside, *places]))} in {what}, where a zone is "
@@ -312,8 +314,8 @@ def offset_of(
 def refuse_other_zone(times: Times, numbers: Mapping[str, np.ndarray], what: str) -> None:
     """Refuses dates without a zone that numbers since 1970 show in another zone than UTC."""
     for name, values in numbers.items():
-        if is_epoch(values) and name_tells(name)[0] == 2:
-            unit = epoch_unit(float(np.nanmedian(values)))
+        unit = epoch_unit_of(values)
+        if unit is not None and name_tells(name)[0] == 2:
             stamps = pd.to_datetime(values, unit=unit, errors="coerce")
             apart = abs((stamps - times.stamps).median())
             if pd.Timedelta("15min") <= apart <= pd.Timedelta("14h"):

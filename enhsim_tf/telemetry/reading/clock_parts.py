@@ -19,7 +19,8 @@ _PARTS = {
     "month": "month mo mm monat",
     "day": "day dy dom dd tag",
     "doy": "doy dayofyear jday ddd",
-    "hour": "hour hr hh stunde hourending hourbeginning",
+    "hour": "hour hr hh stunde",
+    "hour of an interval": "hourending hourbeginning",
     "minute": "minute min mn",
     "second": "second sec ss sekunde sod secondofday",
 } | {unit: UNITS[unit] for unit in ("ms", "us", "ns")}
@@ -171,16 +172,15 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     plain = {name: re.sub(r"\W|_", "", name.casefold()) for name in numbers}
-    # `hour` goes before `hour ending`
-    for name, word in sorted(
-        plain.items(), key=lambda item: item[1].startswith("hour") and len(item[1])
-    ):
+    for name, word in plain.items():
         part = _PART_OF.get(word)
         # the second of `MM` and `mm`
         if word == "mm" and {"month", "doy"} & set(found):
             part = "minute"
         if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
             found.setdefault(part, name)
+    if (of_interval := found.pop("hour of an interval", None)) is not None:
+        found.setdefault("hour", of_interval)
     if "hour" not in found and (
         "second" in found or not plain.get(found.get("minute"), "").startswith("minute")
     ):

@@ -32,13 +32,16 @@ def is_regular(values: np.ndarray) -> bool:
     return bool(np.mean((np.abs(ratios - np.round(ratios)) <= 0.1) & (ratios > 0.5)) >= 0.9)
 
 
-def is_epoch(values: np.ndarray) -> bool:
-    """Whether numbers are times since 1970 in s, ms, us or ns."""
+def epoch_unit_of(values: np.ndarray) -> str | None:
+    """Returns the unit in which numbers are times since 1970, s, ms, us or ns, or None."""
     some = values[:: max(1, len(values) // 1_000)]
-    return (
-        np.isfinite(some).any()
-        and epoch_unit(float(np.median(np.abs(some[np.isfinite(some)])))) is not None
-    )
+    known = some[np.isfinite(some)]
+    return epoch_unit(float(np.median(np.abs(known)))) if len(known) else None
+
+
+def is_epoch(values: np.ndarray) -> bool:
+    """Whether numbers are times since 1970."""
+    return epoch_unit_of(values) is not None
 
 
 def are_whole(values: np.ndarray, least: float, most: float) -> bool:

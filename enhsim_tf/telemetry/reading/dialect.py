@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding
 
 BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
@@ -46,6 +47,7 @@ class Dialect:
     head: list[list[str]]  # cells of the first rows of data
     units: Sequence[str] = ()  # cells of the line between the names and the data, where units stand
     may_lack_last: bool = False  # whether rows may leave out the last cell
+    above: Sequence[str] = ()  # the lines above the data
 
 
 def utf8_of(content: bytes) -> tuple[bytes, list[Finding]]:
@@ -88,12 +90,13 @@ def behind(text: bytes, lines: int) -> bytes:
     return text[begin:]
 
 
-def find_dialect(text: str, name: str, no_header: bool, separator: str | None = None) -> Dialect:
+def find_dialect(text: str, name: str, options: Cleaning, separator: str | None = None) -> Dialect:
     """Finds the separator, if it is not known, the names and the beginning of the data, from the
-    first part of a text.
+    first part of a text, behind the rows that `options` skip.
 
     Raises:
-        InputError: If there is no line of names above the data, and `no_header` is False.
+        InputError: If there is no line of names above the data, and the options do not say so, or
+            if another table stands above it.
         ValueError: If there is nothing but comments.
     """
     lines = [line.rstrip("\r") for line in text[:HEAD].split("\n", _HEAD_LINES)[:_HEAD_LINES]]
@@ -104,14 +107,14 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
     if not any(map(_is_content, lines)):
         raise ValueError("it is empty")
     marks = [mark for mark in separator or _SEPARATORS if any(mark in line for line in lines)]
-    layouts = [_lay_out(mark, lines, no_header) for mark in marks]
+    layouts = [_lay_out(mark, lines, options.no_header) for mark in marks]
     found = [layout for layout in layouts if layout and len(layout.names) > 1]
     if not found:
-        by_blanks, single = (_lay_out(mark, lines, no_header) for mark in (BLANKS, _WHOLE))
+        by_blanks, single = (_lay_out(mark, lines, options.no_header) for mark in (BLANKS, _WHOLE))
         has_blanks = by_blanks is not None and len(by_blanks.names) > 1
         for layout in layouts:  # with too few names; decimal commas may seem to be separators
             if layout and not (layout.names or has_blanks and layout.separator == ","):
-                _refuse_header(layout, lines, name)
+                _refuse_header(layout, name)
         found = [by_blanks if has_blanks else single]
     if found == [None]:
         raise ValueError("lines of different lengths")
@@ -124,19 +127,20 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         and (layout.separator != "," or others.isdisjoint("".join(sum(layout.head[:1], []))))
     ]
     best = max(with_header, key=lambda layout: len(layout.names), default=found[0])
-    if not with_header and not no_header:
-        best = _named_by_comment(best, lines)
+    if not with_header and not options.no_header:
+        best = _named_by_comment(best)
         if best is None:
-            _refuse_header(found[0], lines, name)
+            _refuse_header(found[0], name)
+    _refuse_other_table(best, name, options.skip_rows)
     return dataclasses.replace(
         best, names=[each or f"column {number}" for number, each in enumerate(best.names)]
     )
 
 
-def _refuse_header(found: Dialect, lines: Sequence[str], name: str) -> NoReturn:
+def _refuse_header(found: Dialect, name: str) -> NoReturn:
     """Refuses data without a line of names above it, or with one of another number of names."""
-    above = [number for number in range(found.first_line) if _is_content(lines[number])]
-    cells = _split(lines[above[-1] : above[-1] + 1], found.separator)[0] if above else []
+    above = [number for number, line in enumerate(found.above) if _is_content(line)]
+    cells = _split([found.above[above[-1]]], found.separator)[0] if above else []
     width = len(found.names) or len(found.head[0])
     marks = found.separator != BLANKS
     if marks and 1 < len(cells) != width and not any(map(_SOLID.match, cells)):
@@ -153,12 +157,11 @@ def _refuse_header(found: Dialect, lines: Sequence[str], name: str) -> NoReturn:
     )
 
 
-def refuse_other_table(text: str, found: Dialect, name: str, skip_rows: int) -> None:
+def _refuse_other_table(found: Dialect, name: str, skip_rows: int) -> None:
     """Refuses a text in which another table stands above the one that was found."""
-    rows = _split(text.split("\n", found.first_line)[: found.first_line], found.separator)
     of_data = [
         number
-        for number, row in enumerate(rows)
+        for number, row in enumerate(_split(found.above, found.separator))
         if len(row) > 1 and 4 * sum(bool(_SOLID.match(cell)) for cell in row) >= 3 * len(row)
     ]
     if len(of_data) >= _FEWEST_ROWS:
@@ -237,7 +240,8 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
     skipped = sum(map(bool, rows[:begin])) - any(names)
     head = [row for row in rows[begin:] if row]
     may_lack_last = lacks or any(names) and not names[-1]
-    return Dialect(mark or ",", names, begin, skipped, head, units, may_lack_last)
+    above = lines[:begin]
+    return Dialect(mark or ",", names, begin, skipped, head, units, may_lack_last, above)
 
 
 def _share(row: list[str], solid: Sequence[int]) -> float:
@@ -315,7 +319,7 @@ def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
     return bool(cells) and 2 * sum(bool(_SOLID.match(cell)) for cell in cells) > len(cells)
 
 
-def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
+def _named_by_comment(found: Dialect) -> Dialect | None:
     """Returns the dialect with names from the last comment above the data, as NumPy writes them, or
     None if it has not as many.
 
@@ -324,7 +328,7 @@ def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
     """
     comments = [
         line.lstrip("#%").strip()
-        for line in lines[: found.first_line]
+        for line in found.above
         if line.startswith(("#", "%")) and line.strip("#% ")
     ]
     if not comments:

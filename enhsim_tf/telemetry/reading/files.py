@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
@@ -17,7 +18,7 @@ from enhsim_tf.common.read_errors import MAX_COLUMNS, reading
 from enhsim_tf.telemetry.cleaning.numbers import is_plain
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
-from enhsim_tf.telemetry.cleaning.times import epoch_unit
+from enhsim_tf.telemetry.reading.clock_values import epoch_unit_of
 from enhsim_tf.telemetry.reading.column_names import name_tells
 from enhsim_tf.telemetry.reading.formats import HAS_TABLES, READERS, read_any_text
 from enhsim_tf.telemetry.reading.text_files import Table
@@ -138,9 +139,9 @@ def _with_plain_columns(table: Table, name: str) -> Table:
 
 def _epoch_unit_of(cells: pd.Series) -> str | None:
     """Returns the unit in which a clock may hold times since 1970."""
-    if not is_plain(cells) or name_tells(str(cells.name))[0] == 0 or not cells.notna().any():
+    if not is_plain(cells) or name_tells(str(cells.name))[0] == 0:
         return None
-    return epoch_unit(float(cells.median()))
+    return epoch_unit_of(cells.to_numpy(np.float64, na_value=np.nan))
 
 
 def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:

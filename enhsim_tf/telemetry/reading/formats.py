@@ -185,7 +185,7 @@ def read_excel(content: bytes, name: str, options: Cleaning) -> Table:
     head = frame.head(100).replace(r"\s", " ", regex=True)
     text = head.to_csv(sep="\t", header=False, index=False)
     with reading(name):
-        dialect = find_dialect(text, name, options.no_header, "\t")
+        dialect = find_dialect(text, name, options, "\t")
     frame = frame.iloc[dialect.first_line :].reset_index(drop=True).infer_objects()
     return table_of(frame, dialect, name, None, findings, options.skip_rows)
 

@@ -29,7 +29,6 @@ from enhsim_tf.telemetry.reading.dialect import (
     Dialect,
     behind,
     find_dialect,
-    refuse_other_table,
     utf8_of,
 )
 
@@ -78,6 +77,7 @@ def table_of(
         decimal,
         tuple(findings),
         units,
+        " ".join(dialect.above),
     )
 
 
@@ -97,8 +97,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     head = text[:HEAD].decode(errors="ignore")  # its end may cut a character
     if _ANNOTATION.search(head[:10_000]):
         return _read_annotated(text.decode(), name, findings)
-    dialect = find_dialect(head, name, options.no_header)
-    refuse_other_table(head, dialect, name, options.skip_rows)
+    dialect = find_dialect(head, name, options)
     if dialect.skipped:
         findings.append(
             Finding(
@@ -144,11 +143,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
         )
     table = table_of(frame, dialect, name, decimal, findings, options.skip_rows)
     behind_them = [(row - before, row + above + 2, name) for before, row in enumerate(repeated)]
-    return dataclasses.replace(
-        table,
-        places=Places((*table.places.files, *behind_them)),
-        above=" ".join(head.split("\n", dialect.first_line)[: dialect.first_line]),
-    )
+    return dataclasses.replace(table, places=Places((*table.places.files, *behind_them)))
 
 
 def _may_be_ragged(frame: pd.DataFrame, data: bytes, dialect: Dialect) -> bool:
