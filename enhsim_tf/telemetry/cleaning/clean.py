@@ -99,7 +99,7 @@ def clean(
         )
     kind = SAMPLES if raw.times is None else COUNTED if raw.times.counts else DATES
     if raw.times is not None:
-        log, rows = _rows_with_times(raw, values, options)
+        log, rows, first = _rows_with_times(raw, values, options)
     elif options.interval_s is not None:
         raise InputError(
             f"Expected times with interval_s (--interval). Received: {raw.name} without any. Give "
@@ -109,26 +109,23 @@ def clean(
         log = CleaningLog(list(raw.findings), raw.places)
         found = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
         log.findings.insert(0, found)
+        first = raw.first * UNITS_NS["s"]
         numbers = np.arange(len(values))
-        rows = pd.DataFrame(
-            {"time": (numbers + raw.first) * UNITS_NS["s"], "value": values, "row": numbers}
-        )
+        rows = pd.DataFrame({"time": numbers * UNITS_NS["s"], "value": values, "row": numbers})
     log.findings.extend(noted)
 
-    base = int(rows["time"].iloc[0])
-    parts, used, interval = regularise(
-        rows.assign(time=rows["time"] - base), bad, log, raw.name, options
-    )
+    parts, used, interval = regularise(rows, bad, log, raw.name, options)
     if describe:
         describe_values(parts, values[np.isfinite(values)], log)
 
-    first = -base if kind == SAMPLES else parts[0].begin
-    clock = Clock(interval / 1e9, 0 if kind == SAMPLES else base + round(first), kind)
+    # samples are counted from 0; the clock of others begins with the first part
+    begin = -first if kind == SAMPLES else parts[0].begin
+    clock = Clock(interval / 1e9, first + round(begin), kind)
     telemetry = Telemetry(
         tuple(
             Part(
                 part.values.astype(np.float32)[:, None],
-                (part.begin - first) / 1e9,
+                (part.begin - begin) / 1e9,
                 measured=None if part.measured.all() else part.measured[:, None],
             )
             for part in parts
@@ -181,37 +178,43 @@ def clean_all(
 
 def _rows_with_times(
     raw: RawChannel, values: np.ndarray, options: Cleaning
-) -> tuple[CleaningLog, pd.DataFrame]:
-    """Returns the cleaning log and the rows that have a time, in chronological order."""
-    bad = raw.times.bad
+) -> tuple[CleaningLog, pd.DataFrame, int]:
+    """Returns the cleaning log, the rows that have a time, in chronological order with times since
+    the first, and the first.
+    """
     counts = raw.times.counts
-    had_time = raw.times.stamps.notna()
     zone = raw.times.zone
     local = raw.times.stamps.tz is None
-    times, kept, since = _in_order(raw.times, options.timezone if local else None)
-    has_time = times != pd.NaT.value
+    in_zone = options.timezone if local else None
+    times, kept, first, since, is_rising = _in_order(raw.times, in_zone)
     log = CleaningLog(list(raw.findings), raw.places, times, counts)
-    for kind, mask, text in (
-        ("bad times", bad, "rows whose time cannot be read"),
-        ("missing times", ~had_time & ~bad, "rows without a time"),
-        (
-            "clock change",
-            had_time & ~has_time,
-            f"rows at ambiguous or nonexistent local times of {options.timezone}",
-        ),
-    ):
-        log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}")
+    if len(kept) < len(times):
+        bad = raw.times.bad
+        had_time = raw.times.stamps.notna()
+        for kind, mask, text in (
+            ("bad times", bad, "rows whose time cannot be read"),
+            ("missing times", ~had_time & ~bad, "rows without a time"),
+            (
+                "clock change",
+                had_time & (times == pd.NaT.value),
+                f"rows at ambiguous or nonexistent local times of {options.timezone}",
+            ),
+        ):
+            log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}")
     if not len(kept):
         raise InputError(
             f"Expected rows with times. Received: none in {raw.name}. Name another time column."
         )
-    if (np.diff(times[has_time]) <= 0).any():
+    if not is_rising:
+        has_time = times != pd.NaT.value
         # rows that are there twice, as where exports overlap, do no harm
         twice = pd.DataFrame({"time": times, "value": values}).duplicated()
         rows = np.flatnonzero(has_time & ~twice & np.isfinite(values))
         is_told = not local or options.timezone is not None
         if counts or not is_told or options.same_time != "last":  # which corrects earlier rows
             refuse_steps_back(times[rows], rows, log, raw.name, is_told)
+        early = np.flatnonzero(has_time & (times < np.maximum.accumulate(times)))
+        log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     if local:
         zone = f"{options.timezone or 'UTC'}, as none is stated"
     elif options.timezone and zone != "none":
@@ -220,8 +223,7 @@ def _rows_with_times(
         early = np.flatnonzero(times < np.maximum.accumulate(times))
         early = early[has_time[early]]
         log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
-    first = int(since[0])
-    last = int(since[-1])
+    last = first + int(since[-1])
     span = (
         f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s"
         if counts
@@ -231,18 +233,24 @@ def _rows_with_times(
     details = {"column": raw.clock, "form": raw.times.form, "zone": zone, "counts": counts}
     details |= {"first_ns": first, "last_ns": last}
     log.findings.insert(0, Finding("clock", 1, text, details=details))
-    columns = {"time": since, "value": values[kept], "row": kept}
-    return log, pd.DataFrame(columns, copy=False)
+    is_same = is_rising and len(kept) == len(values)
+    columns = {"time": since, "value": values if is_same else values[kept], "row": kept}
+    return log, pd.DataFrame(columns, copy=False), first
 
 
 @functools.lru_cache(1)
-def _in_order(times: Times, zone: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the times of all rows in nanoseconds, the rows that have one in chronological order,
-    and the times of these. The last result is kept for the other channels of a table.
+def _in_order(
+    times: Times, zone: str | None
+) -> tuple[np.ndarray, np.ndarray, int, np.ndarray, bool]:
+    """Returns the times of all rows in nanoseconds; the rows that have one in chronological order,
+    their first time, and their times since that; whether each row is later than the one before it
+    in the source. The last result is kept for the other channels of a table.
     """
     stamps = times.stamps if zone is None else localize_times(times.stamps, zone)
-    since = stamps.as_unit("ns").asi8
+    all_times = stamps.as_unit("ns").asi8
     rows = np.flatnonzero(stamps.notna())
-    if (np.diff(since[rows]) < 0).any():
-        rows = rows[np.argsort(since[rows], kind="stable")]
-    return since, rows, since[rows]
+    steps = np.diff(all_times[rows])
+    if (steps < 0).any():
+        rows = rows[np.argsort(all_times[rows], kind="stable")]
+    first = int(all_times[rows[0]]) if len(rows) else 0
+    return all_times, rows, first, all_times[rows] - first, bool((steps > 0).all())

@@ -80,14 +80,14 @@ def utf8_of(content: bytes) -> tuple[bytes, list[Finding]]:
     return text, findings
 
 
-def behind(text: bytes, lines: int) -> bytes:
-    """Returns what follows the first lines of a text."""
+def line_start(text: bytes, lines: int) -> int:
+    """Returns the place behind the first lines of a text."""
     begin = 0
     for _ in range(lines):
         begin = text.find(b"\n", begin) + 1
         if not begin:
-            return b""
-    return text[begin:]
+            return len(text)
+    return begin
 
 
 def find_dialect(text: str, name: str, options: Cleaning, separator: str | None = None) -> Dialect:

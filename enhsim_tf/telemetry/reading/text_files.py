@@ -27,8 +27,8 @@ from enhsim_tf.telemetry.reading.dialect import (
     BLANKS,
     HEAD,
     Dialect,
-    behind,
     find_dialect,
+    line_start,
     utf8_of,
 )
 
@@ -39,6 +39,7 @@ _MAX_FLAGS = 3  # different ones, above which they are decimals
 # plain ones, which pandas reads faster than text; other cells in their column leave it text
 _TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d").match
 _DIGITS = re.compile(r"[+-]?[.,]?\d").match
+_FILLED = re.compile(rb"\S").search
 _ANNOTATION = re.compile(r"^#(?:group|datatype|default)\b", re.MULTILINE)
 _ANNOTATED = re.compile(r"((?:^#.*\n)+)((?:^(?!#).*\n?)*)", re.MULTILINE)
 
@@ -91,7 +92,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     """
     text, findings = utf8_of(content)
     if options.skip_rows:
-        text = behind(text, options.skip_rows)
+        text = text[line_start(text, options.skip_rows) :]
         if not text.strip():
             raise ValueError(f"no line is left behind skip_rows={options.skip_rows}")
     head = text[:HEAD].decode(errors="ignore")  # its end may cut a character
@@ -106,8 +107,8 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 f"lines before the data that were skipped: {dialect.skipped:,}",
             )
         )
-    data = behind(text, dialect.first_line)
-    if not data or data.isspace():
+    begin = line_start(text, dialect.first_line)  # a copy of what follows costs time
+    if not _FILLED(text, begin):
         raise InputError(
             f"Expected rows below the header. Received: only names in {name}, "
             f"{', '.join(dialect.names[:4])}. Give a file with values."
@@ -115,12 +116,12 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     above = dialect.first_line + options.skip_rows
     frame = None
     with contextlib.suppress(_RaggedError):
-        frame, decimal = _read_rows(data, dialect, name, options.decimal)
-    if frame is None or _may_be_ragged(frame, data, dialect):
-        data, ragged = _without_ragged(data, dialect, above, name, options.drop_bad)
+        frame, decimal = _read_rows(text, begin, dialect, name, options.decimal)
+    if frame is None or _may_be_ragged(frame, text, begin, dialect):
+        data, ragged = _without_ragged(text[begin:], dialect, above, name, options.drop_bad)
         findings += ragged
         if ragged or frame is None:
-            frame, decimal = _read_rows(data, dialect, name, options.decimal)
+            frame, decimal = _read_rows(data, 0, dialect, name, options.decimal)
     if decimal == ",":
         findings.append(
             Finding(
@@ -146,13 +147,13 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     return dataclasses.replace(table, places=Places((*table.places.files, *behind_them)))
 
 
-def _may_be_ragged(frame: pd.DataFrame, data: bytes, dialect: Dialect) -> bool:
+def _may_be_ragged(frame: pd.DataFrame, text: bytes, begin: int, dialect: Dialect) -> bool:
     """Whether lines that were read may have fewer cells than the header: then some of the last
     column are missing, and so are separators, which can be counted unless cells hold them.
     """
     num_separators = (len(dialect.names) - 1) * len(frame)
     return bool(frame.iloc[:, -1].isna().any()) and (
-        b'"' in data or data.count(dialect.separator.encode()) != num_separators
+        b'"' in text or text.count(dialect.separator.encode(), begin) != num_separators
     )
 
 
@@ -200,24 +201,26 @@ def _rows_of(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, i
 
 
 def _read_rows(
-    data: bytes, dialect: Dialect, name: str, decimal: str | None
+    text: bytes, begin: int, dialect: Dialect, name: str, decimal: str | None
 ) -> tuple[pd.DataFrame, str | None]:
-    """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
+    """Reads the data, which begin at a place of the text, with the decimal sign that all columns
+    allow; None if they do not show it.
+    """
     names = dialect.names
-    if dialect.separator == "," and b'"' not in data:
-        return _parse(data, dialect, decimal), decimal  # no cell has a comma
+    if dialect.separator == "," and text.find(b'"', begin) < 0:
+        return _parse(text, begin, dialect, decimal), decimal  # no cell has a comma
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
     sign = decimal or ("," if any(shows_comma(_some(head[column])) for column in head) else None)
     if dialect.separator == "," and decimal is None:
         _refuse_flags(head, name)
     if sign is None and dialect.separator == ";":
         sign = _sign_of_country(head, names, name)
-    frame = _parse(data, dialect, sign)
+    frame = _parse(text, begin, dialect, sign)
     if sign is None and any(
         is_text(frame[column]) and shows_comma(_some(frame[column])) for column in frame
     ):
         sign = ","
-        frame = _parse(data, dialect, sign)
+        frame = _parse(text, begin, dialect, sign)
     if sign == "," and decimal is None:
         _check_points(frame, names, name)
     return frame, sign
@@ -288,10 +291,10 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
             )
 
 
-def _parse(data: bytes, dialect: Dialect, decimal: str | None) -> pd.DataFrame:
+def _parse(text: bytes, begin: int, dialect: Dialect, decimal: str | None) -> pd.DataFrame:
     width = len(dialect.names)
     is_blanks = dialect.separator == BLANKS
-    head = b"\n" + data[:_HEAD]
+    head = b"\n" + text[begin : begin + _HEAD]
     is_padded = b"\n " in head or f"{dialect.separator} ".encode() in head
     options = {
         "sep": dialect.separator,
@@ -311,11 +314,13 @@ def _parse(data: bytes, dialect: Dialect, decimal: str | None) -> pd.DataFrame:
         ],
         "date_format": "ISO8601",
     }
+    file = io.BytesIO(text)
+    file.seek(begin)
     with warnings.catch_warnings():
         # otherwise lines longer than the header are cut
         warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
-            frame = pd.read_csv(io.BytesIO(data), **options)
+            frame = pd.read_csv(file, **options)
         except pd.errors.EmptyDataError:
             return pd.DataFrame(columns=range(width), dtype=object)
         except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
