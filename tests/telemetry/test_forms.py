@@ -729,6 +729,12 @@ REFUSED = {
         {"options": Cleaning(skip_rows=N + 1)},
         60,
     ),
+    "three rows of another table": (
+        table("time,a,b", UTC[:3], VALUES[:3], VALUES[:3], below=table("time,v", UTC, VALUES)),
+        "--skip-rows 4",
+        {"options": Cleaning(skip_rows=4)},
+        60,
+    ),
     "a zone beside the table": (
         table("time,v", MINUTES, VALUES, above="zone\nEurope/Berlin\n\n"),
         "--timezone Europe/Berlin",

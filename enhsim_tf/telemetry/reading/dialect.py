@@ -21,7 +21,7 @@ _SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal sign
 _HEAD_LINES = 300
 HEAD = 4_000_000
 _LOOK = 50  # columns that are inspected
-_FEWEST_ROWS = 10  # with numbers above the names, below which they are no table
+_FEWEST_ROWS = 3  # with numbers above the names, below which they are no table
 csv.field_size_limit(HEAD)  # with another separator than its own, a line is one cell
 _NUMBER = (
     r"(?:[+-] *)?(?:\d[\d.,'\u2019 \u00a0\u202f]*|[.,]\d+)(?:[de][+-]?\d+)?"
