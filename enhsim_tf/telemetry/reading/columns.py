@@ -3,27 +3,17 @@ series, or channel.
 """
 
 import dataclasses
-import datetime
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import (
-    has_commas,
     is_missing,
-    is_plain,
-    is_text,
-    parse_numbers,
 )
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import (
-    LOOK,
-    TIME_OF_DAY,
     Times,
-    are_spans,
-    date_forms,
     parse_times,
 )
 from enhsim_tf.telemetry.reading.clock import (
@@ -38,6 +28,7 @@ from enhsim_tf.telemetry.reading.clock import (
 from enhsim_tf.telemetry.reading.clock_parts import Clock
 from enhsim_tf.telemetry.reading.clock_values import is_epoch
 from enhsim_tf.telemetry.reading.column_names import is_unnamed, words_of
+from enhsim_tf.telemetry.reading.contents import contents_of
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set(
@@ -60,13 +51,7 @@ _LABELLED = {"severity", "onset", "end", "mask"}
 _WRITTEN = (_LABELLED, {"value", "score", "flag"}, {"copy", "value", "out_of_range"})
 # what these have beside the values
 _OWN = _LABELLED.union("scenario enhanced score score_after flag out_of_range".split())
-_FEWEST_HEX = 3  # different cells with letters, below which they are damaged numbers
 _MAX_STATES = 10  # a label or flag has at most this many different values
-_OBJECTS = {
-    "dates": datetime.date | np.datetime64,
-    "times of day": datetime.time,
-    "spans": datetime.timedelta,
-}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -93,28 +78,9 @@ def lay_out(
     """
     frame = table.frame
     asked = set(columns or ())
-    kinds = {name: _kind_of(frame[name]) for name in frame.columns}
-    if "%" in (options.time_format or ""):
-        kinds |= {
-            name: "dates"
-            for name in frame.columns
-            if name not in asked and _fits(frame[name], str(options.time_format))
-        }
-    # of a family such as D1, D2, ... of which one holds hexadecimal numbers, all do
-    families = {name: name.rstrip("0123456789") for name in kinds}
-    hexadecimal = {
-        family
-        for name, family in families.items()
-        if family != name
-        and kinds[name] == "words"
-        and _are_hex(frame[name].dropna().iloc[:LOOK].astype("str"))
-    }
-    kinds |= {name: "words" for name in kinds if families[name] in hexadecimal - {name}}
-    numbers = {
-        name: _values(frame[name], table.decimal)
-        for name, kind in kinds.items()
-        if kind == "numbers"
-    }
+    contents = contents_of(table, asked, options.time_format, what)
+    kinds = contents.kinds
+    numbers = contents.numbers
     roles = dict.fromkeys(asked, "")  # of each column; that of a channel is ""
 
     def take(role: str, names: Iterable[str]) -> None:
@@ -206,88 +172,6 @@ def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times
     return dataclasses.replace(times, stamps=stamps, zone="stated in its name")
 
 
-def _kind_of(cells: pd.Series) -> str:
-    """Says what a column holds: "numbers", "dates", "spans" of time, "times of day", "words", other
-    "objects", or nothing ("empty").
-
-    Text that holds at least some numbers is numbers.
-    """
-    kind = cells.dtype
-    if isinstance(kind, pd.CategoricalDtype):
-        return _kind_of(cells.iloc[:LOOK].astype(object))
-    if pd.api.types.is_datetime64_any_dtype(kind) or isinstance(kind, pd.PeriodDtype):
-        return "dates"
-    if getattr(kind, "kind", "") == "m":
-        return "spans"
-    if pd.api.types.is_bool_dtype(kind):
-        return "words"
-    if not is_text(cells):
-        return "objects" if not is_plain(cells) else "numbers" if cells.notna().any() else "empty"
-    for some in (cells.iloc[: 10 * LOOK], cells):
-        given = some[~is_missing(some)].iloc[:LOOK]
-        if len(given):
-            break
-    else:
-        return "empty"
-    for kind, classes in _OBJECTS.items():
-        if isinstance(given.iloc[0], classes):
-            return kind
-    text = (
-        given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)]
-        .astype("str")
-        .str.strip()
-    )
-    if len(text) == len(given) and (_are_hex(text) or _turn_hex(text, cells)):
-        return "words"
-    if not parse_numbers(given, "", drop=True, units=False)[1].all():
-        return "numbers"
-    if len(text) < len(given) / 2:
-        return "objects"
-    if has_commas(text):  # which are refused where they can be read in two ways
-        return "numbers"
-    if text.str.fullmatch(TIME_OF_DAY).mean() > 0.5:  # elapsed ones may pass 24 h late
-        return (
-            "spans"
-            if are_spans(cells[~is_missing(cells)].astype("str").str.strip())
-            else "times of day"
-        )
-    if are_spans(text):
-        return "spans"
-    return (
-        "dates"
-        if date_forms(text)
-        else "words"
-        if parse_numbers(given, "", drop=True)[1].all()
-        else "numbers"
-    )
-
-
-def _are_hex(text: pd.Series) -> bool:
-    """Whether text is hexadecimal numbers of one length, some with letters."""
-    return (
-        text.str.len().nunique() == 1
-        and bool(text.str.fullmatch("(?:0[xX])?[0-9A-Fa-f]{2,}").all())
-        and bool(text.str.contains("[A-Fa-f]").any())
-        and not text.str.fullmatch(r"\d+[eE]\d+|\d+").all()
-    )
-
-
-def _turn_hex(head: pd.Series, cells: pd.Series) -> bool:
-    """Whether numbers of one length are hexadecimal further down, as `9A` behind `10`."""
-    if head.str.len().nunique() > 1 or not head.str.fullmatch(r"\d{2,}").all():
-        return False
-    text = cells.dropna().astype("str").str.strip()
-    mixed = text[text.str.fullmatch(r"(?=.*\d)[\dA-Fa-f]*[A-Fa-f][\dA-Fa-f]*")]
-    of_length = mixed[mixed.str.len() == len(head.iloc[0])]
-    return of_length[~of_length.str.fullmatch(r"\d+[eE]\d+")].nunique() >= _FEWEST_HEX
-
-
-def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
-    if is_text(cells) or isinstance(cells.dtype, pd.CategoricalDtype):
-        return parse_numbers(cells, "", drop=True, decimal=decimal)[0]
-    return cells.to_numpy(np.float64, na_value=np.nan)
-
-
 def _words_of(name: str) -> set[str]:
     split = words_of(name)
     return {*split, *("".join(pair) for pair in zip(split, split[1:], strict=False))}
@@ -328,17 +212,6 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
 def _counts(values: np.ndarray) -> bool:
     """Whether values beside a clock count the rows from 0 or 1."""
     return len(values) > 2 and values[0] in (0, 1) and bool((np.diff(values) == 1).all())
-
-
-def _fits(cells: pd.Series, form: str) -> bool:
-    """Whether most cells are dates of a given format."""
-    head = cells.dropna().iloc[:LOOK]
-    if not len(head) or not (is_text(head) or pd.api.types.is_integer_dtype(head.dtype)):
-        return False
-    try:
-        return bool(parse_times(head, "", drop=True, form=form).bad.mean() < 0.5)
-    except InputError:  # an invalid format, which is refused when the clock is read
-        return False
 
 
 def anomalous(cells: pd.Series) -> np.ndarray | None:
