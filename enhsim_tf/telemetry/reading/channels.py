@@ -7,6 +7,7 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pandas as pd
@@ -99,29 +100,17 @@ def read_table_channels(
         used = (*keys, *(layout.words if options.states else ()))
         if names := [name for name in layout.left_out.get(kind, ()) if name not in used]:
             findings.append(Finding(kind, len(names), f"{text}: {', '.join(names[:8])}"))
-    if not keys:
+    if keys:
+        chosen, noted = _several_series(table, keys, layout, columns is None, what)
+    else:
         _refuse_parallel_files(table.places, layout, what)
         chosen = {name: (name, None) for name in layout.channels}
+        noted = []
         if options.states:
             table, states, noted = _with_states(table, layout, named)
             chosen = {name: place for name, place in chosen.items() if name not in layout.words}
             chosen |= {name: (name, None) for name in states}
-            findings += noted
-    else:
-        chosen = _name_series(
-            table.frame, keys, [name for name in layout.channels if name not in keys], what
-        )
-        if columns is None and (
-            empty := [name for name, place in chosen.items() if not _has_numbers(table, *place)]
-        ):
-            chosen = {name: place for name, place in chosen.items() if name not in empty}
-            text = f"series without numbers: {', '.join(empty[:8])}"
-            findings.append(Finding("columns left out", len(empty), text))
-        text = (
-            f"series told apart by {', '.join(keys)}: {len(chosen):,} "
-            f"({', '.join(list(chosen)[:6])})"
-        )
-        findings.append(Finding("series", len(chosen), text))
+    findings += noted
     if columns is not None and named is None:
         unknown = next((name for name in columns if name not in chosen), None)
         if unknown is not None:
@@ -131,27 +120,61 @@ def read_table_channels(
             )
         chosen = {name: chosen[name] for name in columns}
     if not chosen:
-        left = ", ".join(
-            _with_cell(table.frame[name]) for names in layout.left_out.values() for name in names
-        )
-        left = "".join(f"; {finding.text}" for finding in findings if finding.kind == "files") + (
-            f"; left out: {left}" if left else ""
-        )
-        has_states = any(_is_state(table.frame[name]) for name in layout.words)
-        pairs = "only numbers below a line of names, with commas between them"
-        other = "one number in each cell; a workbook needs the saved values of its formulas"
-        raise InputError(
-            f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
-            [{"states": True} | ({"series_column": NO_TIME} if keys else {})]
-            if has_states and not options.states
-            else (),
-            pairs if _PAIR.search(left) else other,
-        )
+        _refuse_without_numbers(table, layout, findings, bool(keys), options, what)
     channels = {
         name: _channel(table, layout, name, *place, findings, options)
         for name, place in chosen.items()
     }
     return Channels(channels, table.frame)
+
+
+def _several_series(
+    table: Table, keys: Sequence[str], layout: Layout, leave_out_empty: bool, what: str
+) -> tuple[dict[str, tuple[str, np.ndarray]], list[Finding]]:
+    """Returns the column and the rows of each of several series by its name, and findings."""
+    channels = [name for name in layout.channels if name not in keys]
+    chosen = _name_series(table.frame, keys, channels, what)
+    findings = []
+    if leave_out_empty and (
+        empty := [name for name, place in chosen.items() if not _has_numbers(table, *place)]
+    ):
+        chosen = {name: place for name, place in chosen.items() if name not in empty}
+        text = f"series without numbers: {', '.join(empty[:8])}"
+        findings.append(Finding("columns left out", len(empty), text))
+    text = (
+        f"series told apart by {', '.join(keys)}: {len(chosen):,} ({', '.join(list(chosen)[:6])})"
+    )
+    findings.append(Finding("series", len(chosen), text))
+    return chosen, findings
+
+
+def _refuse_without_numbers(
+    table: Table,
+    layout: Layout,
+    findings: Sequence[Finding],
+    has_keys: bool,
+    options: Cleaning,
+    what: str,
+) -> NoReturn:
+    """Refuses a table without channels, and says what was left out."""
+    left = ", ".join(
+        _with_cell(table.frame[name]) for names in layout.left_out.values() for name in names
+    )
+    left = "".join(f"; {finding.text}" for finding in findings if finding.kind == "files") + (
+        f"; left out: {left}" if left else ""
+    )
+    may_be_states = not options.states and any(
+        _is_state(table.frame[name]) for name in layout.words
+    )
+    pairs = "only numbers below a line of names, with commas between them"
+    other = "one number in each cell; a workbook needs the saved values of its formulas"
+    raise InputError(
+        f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
+        [{"states": True} | ({"series_column": NO_TIME} if has_keys else {})]
+        if may_be_states
+        else (),
+        pairs if _PAIR.search(left) else other,
+    )
 
 
 def _has_numbers(table: Table, column: str, rows: np.ndarray) -> bool:

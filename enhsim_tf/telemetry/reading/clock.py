@@ -26,6 +26,7 @@ from enhsim_tf.telemetry.cleaning.times import (
 from enhsim_tf.telemetry.reading.clock_parts import (
     Clock,
     are_days,
+    clock_of_fractions,
     clock_of_parts,
     joined_clock,
     seconds_and_fractions,
@@ -49,6 +50,7 @@ from enhsim_tf.telemetry.reading.column_names import (
     without_ends,
     words_of,
 )
+from enhsim_tf.telemetry.reading.contents import Contents, first_cells
 
 # instead of the name of a time column: the table has no times, and samples are counted
 NO_TIME = "none"
@@ -71,112 +73,114 @@ def _seconds_of(spans: pd.Series) -> np.ndarray:
     return np.where(stamps.isna(), np.nan, stamps.as_unit("ns").asi8 / 1e9)
 
 
-def find_clock(
-    frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str
-) -> Clock:
+def find_clock(table: Contents) -> Clock:
     """Finds the clock of a table; refuses one in which several columns may be it, or one of which
-    only the values speak for it.
-
-    `kinds` are those of `columns.lay_out`; `numbers` are the values of the columns of numbers that
-    are not asked for as channels.
+    only the values speak for it. The numbers of the table are without those of columns that are
+    asked for as channels.
     """
-    tells = {name: name_tells(name)[0] for name in kinds}
-    of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "spans")}
-    varying = _varying(of_kind["dates"], frame)
-    dates = without_ends(varying or of_kind["dates"][:1])
-    spans = [name for name in of_kind["spans"] if may_count(_seconds_of(frame[name]))]
-    spans.sort(key=lambda name: -tells[name])
-    named = [name for name in numbers if tells[name] == 2]
-    compact = [name for name in named if compact_form(numbers[name]) == "%Y%m%d"]
-    if (joined := joined_clock(frame, kinds, dates or compact, numbers)) is not None:
+    frame = table.frame
+    numbers = table.numbers
+    tells = {name: name_tells(name)[0] for name in table.kinds}
+    varying = _varying(table)
+    dates = without_ends(varying or table.of_kind("dates")[:1])
+    compact = [
+        name
+        for name, values in numbers.items()
+        if tells[name] == 2 and compact_form(values) == "%Y%m%d"
+    ]
+    if (joined := joined_clock(table, dates or compact)) is not None:
         return joined
     dates = [name for name in dates if tells[name]] or dates
     if dates and frame[dates[0]].iloc[: 50 * LOOK].duplicated().mean() > _OFTEN:
-        _refuse_apart_times(dates[0], kinds, frame, numbers, what)
+        _refuse_apart_times(table, dates[0])
     if varying:
-        return _one_of(dates, frame, what)
-    if (parts := clock_of_parts(numbers)) is not None:
-        hours = [name for name in kinds if kinds[name] == "times of day"]
-        if len(hours) == 1 and parts.added is None:
-            days = parts.cells.dt.strftime("%Y-%m-%d ")
-            return Clock((*parts.columns, hours[0]), days + frame[hours[0]].astype("str"))
+        return _one_of(table, dates)
+    if (parts := clock_of_parts(table)) is not None:
         return parts
     fractions = seconds_and_fractions(numbers)
-    whole = {name: values for name, values in numbers.items() if name not in sum(fractions, ())}
-    may_be = {name for name in whole if _may_be_clock(tells[name], whole[name])}
+    may_be = {
+        name: values
+        for name, values in numbers.items()
+        if name not in sum(fractions, ()) and _may_be_clock(tells[name], values)
+    }
+    spans = [name for name in table.of_kind("spans") if may_count(_seconds_of(frame[name]))]
     if spans and not fractions and all(tells[name] < 2 for name in may_be):
-        return Clock((spans[0],), frame[spans[0]])
+        span = max(spans, key=lambda name: tells[name])
+        return Clock((span,), frame[span])
     if fractions and not may_be:
-        (seconds, rest), *_ = fractions
-        unit = UNIT_OF[words_of(rest)[-1]]
-        added = pd.Series(pd.to_timedelta(numbers[rest], unit=unit))
-        return Clock(fractions[0], pd.Series(numbers[seconds]), added)
-    numbers = whole
-    best = max((tells[name] for name in may_be), default=0)
-    clocks = [name for name in numbers if name in may_be and tells[name] == best]
+        return clock_of_fractions(numbers, fractions[0])
+    if may_be:
+        clocks = _clearest(may_be, tells)
+        if compact and clocks != compact[:1]:
+            _refuse_apart(table, compact[0], clocks[0])
+        if dates and not is_epoch(numbers[clocks[0]]) and name_tells(clocks[0])[1] is None:
+            _refuse_apart(table, dates[0], clocks[0], [{"time": clocks[0]}])
+        return _one_of(table, clocks)
+    return _one_of(table, dates) if dates else _unclear_clock(table, tells)
+
+
+def _clearest(clocks: Mapping[str, np.ndarray], tells: Mapping[str, int]) -> list[str]:
+    """Returns the clocks whose names say so most clearly, one of those that show the same time."""
+    best = max(tells[name] for name in clocks)
+    named = [name for name in clocks if tells[name] == best]
     # what begins again, such as the time of a step, is no clock beside one that does not
-    ahead = [name for name in clocks if not (np.diff(numbers[name]) < 0).any()]
-    first, *others = ahead or clocks or [""]
-    others = [name for name in others if not shows_time(numbers[first], numbers[name])]
-    clocks = without_ends([first, *others]) if first else []
-    if clocks and compact and clocks != compact[:1]:
-        _refuse_apart(compact[0], clocks[0], frame, what)
-    if clocks and dates and not is_epoch(numbers[clocks[0]]) and name_tells(clocks[0])[1] is None:
-        _refuse_apart(dates[0], clocks[0], frame, what, [{"time": clocks[0]}])
-    if clocks or dates:
-        return _one_of(clocks or dates, frame, what)
-    for name, kind in kinds.items():
+    ahead = [name for name in named if not (np.diff(clocks[name]) < 0).any()]
+    first, *others = ahead or named
+    others = [name for name in others if not shows_time(clocks[first], clocks[name])]
+    return without_ends([first, *others])
+
+
+def _unclear_clock(table: Contents, tells: Mapping[str, int]) -> Clock:
+    """Returns a column of words that is named like a clock, to be refused with its first cell, or
+    none, whose samples are counted; refuses other columns that may be a clock.
+    """
+    for name, kind in table.kinds.items():
         if kind == "times of day":
             raise InputError(
-                f"Expected times with a date. Received: {str(frame[name].dropna().iloc[0])!r} in "
-                f"{name!r} of {what}.",
+                "Expected times with a date. Received: "
+                f"{str(table.frame[name].dropna().iloc[0])!r} in {name!r} of {table.what}.",
                 [_COUNT],
                 "a column of dates",
             )
         if tells[name] == 2 and kind == "words":
-            return Clock((name,), frame[name])  # to be refused with its first cell
-    named += [name for name in of_kind["spans"] if tells[name] == 2]
-    if named:
-        raise InputError(
-            f"Expected a clock that increases. Received: {named[0]!r} of {what}, which is named "
-            "like one and does not.",
-            [_COUNT, {"time": named[0]}],
-        )
-    _refuse_unknown(frame, kinds, numbers, what)
+            return Clock((name,), table.frame[name])
+    for name in (*table.numbers, *table.of_kind("spans")):
+        if tells[name] == 2:
+            raise InputError(
+                f"Expected a clock that increases. Received: {name!r} of {table.what}, which is "
+                "named like one and does not.",
+                [_COUNT, {"time": name}],
+            )
+    _refuse_unknown(table)
     return Clock()
 
 
-def _refuse_apart_times(
-    day: str,
-    kinds: Mapping[str, str],
-    frame: pd.DataFrame,
-    numbers: Mapping[str, np.ndarray],
-    what: str,
-) -> None:
+def _refuse_apart_times(table: Contents, day: str) -> None:
     """Refuses dates that repeat beside what may be their time of day, in a form that is not read,
     or beside another clock that does not repeat.
     """
-    for name, kind in kinds.items():
-        if name in numbers and name_tells(name)[0] == 2:
-            values = numbers[name][np.isfinite(numbers[name])]
+    days = table.frame[day]
+    for name, kind in table.kinds.items():
+        if name in table.numbers and name_tells(name)[0] == 2:
+            values = table.numbers[name][np.isfinite(table.numbers[name])]
             is_apart = name_tells(name)[1] is None and may_be_time_of_day(values)
-            is_finer = (np.diff(values) > 0).all() and frame[day].nunique() > 1
+            is_finer = (np.diff(values) > 0).all() and days.nunique() > 1
             if not is_apart and is_finer:
-                _one_of([day, name], frame, what)
+                _one_of(table, [day, name])
         else:
-            cells = frame[name].dropna().iloc[:LOOK].astype("str")
+            cells = first_cells(table.frame[name])
             is_apart = kind == "words" and cells.str.fullmatch(_TIME_LIKE).mean() > 0.9
-        if is_apart and are_days(frame[day]):
-            _refuse_apart(day, name, frame, what)
+        if is_apart and are_days(days):
+            _refuse_apart(table, day, name)
 
 
 def _refuse_apart(
-    day: str, time: str, frame: pd.DataFrame, what: str, options: Sequence[dict[str, str]] = ()
+    table: Contents, day: str, time: str, options: Sequence[dict[str, str]] = ()
 ) -> NoReturn:
-    cells = ", ".join(format_cell(frame[name].iloc[0]) for name in (day, time))
+    cells = ", ".join(format_cell(table.frame[name].iloc[0]) for name in (day, time))
     raise InputError(
         f"Expected a date and its time of day in one column. Received: {day!r} and {time!r} "
-        f"({cells}) in {what}.",
+        f"({cells}) in {table.what}.",
         [*options, _COUNT],
         "both in one column, as 2024-03-01T12:00:00",
     )
@@ -188,19 +192,19 @@ def _may_be_clock(tells: int, values: np.ndarray) -> bool:
     )
 
 
-def _one_of(names: list[str], frame: pd.DataFrame, what: str) -> Clock:
+def _one_of(table: Contents, names: list[str]) -> Clock:
     if len(names) > 1:
         raise InputError(
-            f"Expected one time column. Received: {', '.join(names[:4])} in {what}.",
+            f"Expected one time column. Received: {', '.join(names[:4])} in {table.what}.",
             [*({"time": name} for name in names[:4]), _COUNT],
         )
-    return Clock((names[0],), frame[names[0]])
+    return Clock((names[0],), table.frame[names[0]])
 
 
-def _refuse_unknown(
-    frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str
-) -> None:
+def _refuse_unknown(table: Contents) -> None:
     """Refuses a column that may be a clock of which neither name nor form is known."""
+    kinds = table.kinds
+    numbers = table.numbers
     in_order = (
         name
         for name, each in numbers.items()
@@ -218,24 +222,24 @@ def _refuse_unknown(
     groups = _signals_of(kinds, ramps)
     if not all(is_nearly(numbers[ramps[0]], numbers[name]) for name in groups):
         raise InputError(
-            f"Expected to know the clock. Received: {', '.join(list(groups)[:4])} of {what}, which "
-            "increase in equal steps, each with signals of its own.",
+            f"Expected to know the clock. Received: {', '.join(list(groups)[:4])} of {table.what}, "
+            "which increase in equal steps, each with signals of its own.",
             [*({"time": name, "columns": group} for name, group in groups.items()), _COUNT],
         )
     ramp = next(iter(ramps), next(in_order, None))
-    if ramp is not None and sum(kind == "numbers" for kind in kinds.values()) > 1:
+    if ramp is not None and len(table.of_kind("numbers")) > 1:
         step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
         raise InputError(
-            f"Expected to know the clock. Received: {ramp!r} of {what}, which increases in steps "
-            f"of {step:g}, as a clock or a counter does.",
+            f"Expected to know the clock. Received: {ramp!r} of {table.what}, which increases in "
+            f"steps of {step:g}, as a clock or a counter does.",
             [
                 {"time": ramp},
                 *([] if is_epoch(numbers[ramp]) else [{"time": ramp, "time_format": "ms"}]),
                 _COUNT,
             ],
         )
-    for name in (name for name, kind in kinds.items() if kind == "words"):
-        cells = frame[name].dropna().astype("str").iloc[:1_000]
+    for name in table.of_kind("words"):
+        cells = first_cells(table.frame[name], 1_000)
         if (
             len(cells) >= FEWEST
             and cells.is_unique
@@ -243,7 +247,7 @@ def _refuse_unknown(
         ):
             raise InputError(
                 f"Expected to know the clock. Received: {cells.iloc[0][:40]!r} in {name!r} of "
-                f"{what}, which may be a time of an unknown form.",
+                f"{table.what}, which may be a time of an unknown form.",
                 [_COUNT],
                 f"{option_text({'time': name})} with --time-format",
             )
@@ -327,16 +331,13 @@ def refuse_other_zone(times: Times, numbers: Mapping[str, np.ndarray], what: str
                 )
 
 
-def refuse_own_clocks(
-    frame: pd.DataFrame,
-    kinds: Mapping[str, str],
-    numbers: Mapping[str, np.ndarray],
-    asked: Collection[str],
-    what: str,
-) -> None:
+def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:
     """Refuses signals that each have a clock of their own beside them, unless those of one clock
     are asked for.
     """
+    frame = table.frame
+    kinds = table.kinds
+    numbers = table.numbers
     clocks = {
         name
         for name in frame
@@ -365,8 +366,8 @@ def refuse_own_clocks(
         for name in others
     ):
         raise InputError(
-            f"Expected one clock. Received: {len(groups)} in {what}, each with signals of its own "
-            f"({', '.join(list(groups)[:4])}).",
+            f"Expected one clock. Received: {len(groups)} in {table.what}, each with signals of "
+            f"its own ({', '.join(list(groups)[:4])}).",
             [{"time": name, "columns": group} for name, group in groups.items()],
         )
 
@@ -389,15 +390,13 @@ def _is_named_clock(name: str, values: np.ndarray) -> bool:
     return name_tells(name)[0] == 2 and _may_be_clock(2, values[np.isfinite(values)])
 
 
-def further_clocks(
-    clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], kinds: Mapping[str, str]
-) -> set[str]:
+def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[str]:
     """Returns the columns that show the time once more, or show it although samples are counted."""
-    found = {name for name in numbers if name_tells(name)[0] == 2} | {
-        name for name, kind in kinds.items() if kind in ("dates", "times of day")
-    }
+    numbers = table.numbers
+    found = {name for name in numbers if name_tells(name)[0] == 2}
+    found.update(table.of_kind("dates"), table.of_kind("times of day"))
     if times is None:
-        parts = clock_of_parts(numbers) or Clock()
+        parts = clock_of_parts(table) or Clock()
         return found.union(
             parts.columns,
             (
@@ -420,10 +419,13 @@ def further_clocks(
     return found
 
 
-def _varying(names: list[str], frame: pd.DataFrame) -> list[str]:
-    """Leaves out columns that hold the same date throughout, such as the range of a query."""
+def _varying(table: Contents) -> list[str]:
+    """Returns the columns of dates without those that hold the same date throughout, such as the
+    range of a query.
+    """
+    frame = table.frame
     return [
         name
-        for name in names
+        for name in table.of_kind("dates")
         if frame[name].iloc[:1_000].nunique() > 1 or frame[name].nunique() > 1
     ]

@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import LOOK, parse_times
+from enhsim_tf.telemetry.cleaning.times import parse_times
 from enhsim_tf.telemetry.reading.clock_values import are_whole
 from enhsim_tf.telemetry.reading.column_names import UNIT_OF, UNITS, without_ends, words_of
+from enhsim_tf.telemetry.reading.contents import Contents, first_cells
 
 _PARTS = {
     "year": "year yyyy yy yr jahr",
@@ -44,16 +45,13 @@ class Clock(NamedTuple):
     added: pd.Series | None = None  # time spans
 
 
-def joined_clock(
-    frame: pd.DataFrame,
-    kinds: Mapping[str, str],
-    dates: list[str],
-    numbers: Mapping[str, np.ndarray],
-) -> Clock | None:
+def joined_clock(table: Contents, dates: list[str]) -> Clock | None:
     """Returns the clock that a column of dates and columns of the time of day, in text or whole
     numbers, make together, or None.
     """
-    hours = without_ends([name for name in kinds if kinds[name] == "times of day"])
+    frame = table.frame
+    numbers = table.numbers
+    hours = without_ends(table.of_kind("times of day"))
     if len(dates) != 1 or len(hours) > 1:
         return None
     cells = frame[dates[0]]
@@ -62,12 +60,12 @@ def joined_clock(
         cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
     is_day = are_days(cells)
     has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # far dates have no text with one
-    head = (cells.dt.tz_convert(None) if has_zone else cells).dropna().iloc[:LOOK].astype("str")
+    head = first_cells(cells.dt.tz_convert(None) if has_zone else cells)
     whole_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
     parts = {part: name for part, name in _parts_of(numbers).items() if part in _MOST}
     below = {part: name for part, name in parts.items() if part in _FRACTIONS}
     if hours and is_day:
-        lacks = frame[hours[0]].dropna().iloc[:LOOK].astype("str").str.fullmatch(r" *\d\d?:\d\d *")
+        lacks = first_cells(frame[hours[0]]).str.fullmatch(r" *\d\d?:\d\d *")
         has_seconds = "second" in parts and np.nanmax(numbers[parts["second"]]) <= _MOST["second"]
         parts = ({"second": parts["second"]} if lacks.all() and has_seconds else {}) | below
     elif not is_day and below and whole_seconds:
@@ -80,8 +78,8 @@ def joined_clock(
     if hours and is_day:
         texts = hours + [
             name
-            for name, kind in kinds.items()
-            if kind == "words" and frame[name].dropna().isin(["AM", "PM", "am", "pm"]).all()
+            for name in table.of_kind("words")
+            if frame[name].dropna().isin(["AM", "PM", "am", "pm"]).all()
         ]
         if pd.api.types.is_datetime64_any_dtype(cells.dtype):
             cells = cells.dt.strftime("%Y-%m-%d")
@@ -96,10 +94,11 @@ def joined_clock(
     return Clock(columns, cells, added) if len(columns) > 1 else None
 
 
-def clock_of_parts(numbers: Mapping[str, np.ndarray]) -> Clock | None:
+def clock_of_parts(table: Contents) -> Clock | None:
     """Returns the clock of columns for the year, the month and day or the day of year, and perhaps
     the time of day, or None.
     """
+    numbers = table.numbers
     parts = _parts_of(numbers)
     if not {"doy", "month"} & set(parts) or "year" not in parts:
         return None
@@ -112,7 +111,21 @@ def clock_of_parts(numbers: Mapping[str, np.ndarray]) -> Clock | None:
     days = {part: numbers[parts[part]] if part in parts else 1.0 for part in of_date}
     days = pd.DataFrame({"year": years, "month": 1.0, "day": 1.0} | days)
     stamps = pd.to_datetime(days, errors="coerce").astype("datetime64[ns]")
-    return Clock(tuple(parts.values()), stamps, _added(numbers, parts))
+    columns = tuple(parts.values())
+    added = _added(numbers, parts)
+    hours = table.of_kind("times of day")
+    if len(hours) == 1 and added is None:
+        text = stamps.dt.strftime("%Y-%m-%d ") + table.frame[hours[0]].astype("str")
+        return Clock((*columns, hours[0]), text)
+    return Clock(columns, stamps, added)
+
+
+def clock_of_fractions(numbers: Mapping[str, np.ndarray], pair: tuple[str, str]) -> Clock:
+    """Returns the clock of one of the pairs that `seconds_and_fractions` finds."""
+    seconds, rest = pair
+    unit = UNIT_OF[words_of(rest)[-1]]
+    added = pd.Series(pd.to_timedelta(numbers[rest], unit=unit))
+    return Clock(pair, pd.Series(numbers[seconds]), added)
 
 
 def seconds_and_fractions(numbers: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
@@ -139,8 +152,7 @@ def are_days(cells: pd.Series) -> bool:
     """Whether dates have no time of day; who keeps a zone keeps times."""
     if isinstance(cells.dtype, pd.DatetimeTZDtype):  # far ones have no text
         return False
-    head = cells.dropna().iloc[:LOOK].astype("str")
-    return not head.str.contains(r":|T\d|\d{8}\d").any()
+    return not first_cells(cells).str.contains(r":|T\d|\d{8}\d").any()
 
 
 def _makes_alike(cells: pd.Series, added: pd.Series) -> bool:

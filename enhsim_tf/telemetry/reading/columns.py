@@ -3,19 +3,14 @@ series, or channel.
 """
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.telemetry.cleaning.numbers import (
-    is_missing,
-)
+from enhsim_tf.telemetry.cleaning.numbers import is_missing
 from enhsim_tf.telemetry.cleaning.options import Cleaning
-from enhsim_tf.telemetry.cleaning.times import (
-    Times,
-    parse_times,
-)
+from enhsim_tf.telemetry.cleaning.times import Times, parse_times
 from enhsim_tf.telemetry.reading.clock import (
     NO_TIME,
     find_clock,
@@ -28,7 +23,7 @@ from enhsim_tf.telemetry.reading.clock import (
 from enhsim_tf.telemetry.reading.clock_parts import Clock
 from enhsim_tf.telemetry.reading.clock_values import is_epoch
 from enhsim_tf.telemetry.reading.column_names import is_unnamed, words_of
-from enhsim_tf.telemetry.reading.contents import contents_of
+from enhsim_tf.telemetry.reading.contents import Contents, contents_of
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set(
@@ -76,83 +71,71 @@ def lay_out(
     `columns` are those that were asked for as channels, and `time` is the name of the time column
     or `NO_TIME`.
     """
-    frame = table.frame
     asked = set(columns or ())
     contents = contents_of(table, asked, options.time_format, what)
     kinds = contents.kinds
     numbers = contents.numbers
     roles = dict.fromkeys(asked, "")  # of each column; that of a channel is ""
-
-    def take(role: str, names: Iterable[str]) -> None:
-        roles.update({name: role for name in names if name not in roles})
-
-    take("labels", _labels_of(frame, kinds, asked, options))
-    take("series", options.series_column or ())
-    take(
-        "own columns",
-        _OWN.intersection(frame.columns)
-        if any(marks <= set(frame.columns) for marks in _WRITTEN)
-        else (),
-    )
-    take(
-        "quality flags",
-        [
-            name
-            for name, kind in kinds.items()
-            if _words_of(name) & _FLAGS and _has_states(frame[name], kind)
-        ],
-    )
-    is_influx = {"result", "table", "_time"} <= set(kinds)
-    take(
-        "row numbers",
-        [
-            name
-            for name in numbers
-            if _numbers_rows(name, numbers[name]) or is_influx and name == "table"
-        ],
-    )
-    refuse_own_clocks(frame, kinds, numbers, asked, what)
+    _take(roles, _roles_without_clock(contents, asked, options))
+    refuse_own_clocks(contents, asked)
     if time is None:
         free = {name: kind for name, kind in kinds.items() if not roles.get(name)}
-        clock = find_clock(
-            frame,
-            free,
-            {name: values for name, values in numbers.items() if name not in roles},
-            what,
-        )
+        values = {name: values for name, values in numbers.items() if name not in roles}
+        clock = find_clock(dataclasses.replace(contents, kinds=free, numbers=values))
     else:
-        clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
+        clock = Clock() if time == NO_TIME else Clock((time,), table.frame[time])
     times = _times_of(clock, table, options, what) if clock.columns else None
-    take("clock", clock.columns)
-    further = further_clocks(clock, times, numbers, kinds)
-    take("further clocks", further)
+    further = further_clocks(contents, clock, times)
+    _take(roles, {"clock": clock.columns, "further clocks": further})
     if times is not None and not times.zone and options.timezone is None:
         refuse_other_zone(times, {name: numbers[name] for name in further & set(numbers)}, what)
-    counted = [
-        name
-        for name, values in numbers.items()
-        if name not in roles
-        and (
-            clock.columns
-            and _counts(values)
-            or is_unnamed(name)
-            and not is_epoch(values)
-            and len(np.unique(values)) == len(values)
-            and not (values % 1).any()
-        )
-    ]
+    free_numbers = {name: values for name, values in numbers.items() if name not in roles}
+    counted = [name for name, values in free_numbers.items() if _counts(name, values, clock)]
     # if the only column counts, it is the channel
     if len(counted) < sum(not roles.get(name) for name in numbers):
-        take("row numbers", counted)
+        _take(roles, {"row numbers": counted})
     channels = [name for name in numbers if not roles.get(name)] if columns is None else columns
-    words = tuple(name for name, kind in kinds.items() if kind == "words" and not roles.get(name))
+    words = tuple(name for name in contents.of_kind("words") if not roles.get(name))
     if columns is None:
-        take("columns left out", [name for name in kinds if name not in channels])
+        _take(roles, {"columns left out": [name for name in kinds if name not in channels]})
     left_out: dict[str, list[str]] = {}
     for name in kinds:
         if roles.get(name, "") not in ("", "clock", "series"):
             left_out.setdefault(roles[name], []).append(name)
     return Layout(clock, times, tuple(channels), tuple(left_out.get("labels", ())), words, left_out)
+
+
+def _take(roles: dict[str, str], names_by_role: Mapping[str, Iterable[str]]) -> None:
+    """Gives roles to the columns that have none."""
+    for role, names in names_by_role.items():
+        for name in names:
+            roles.setdefault(name, role)
+
+
+def _roles_without_clock(
+    contents: Contents, asked: Collection[str], options: Cleaning
+) -> dict[str, Iterable[str]]:
+    """Returns the columns that are told by their names and values alone, by their roles; the first
+    role of a column counts.
+    """
+    names = set(contents.kinds)
+    is_written = any(marks <= names for marks in _WRITTEN)
+    is_influx = {"result", "table", "_time"} <= names
+    return {
+        "labels": _labels_of(contents, asked, options),
+        "series": options.series_column or (),
+        "own columns": _OWN & names if is_written else (),
+        "quality flags": [
+            name
+            for name in contents.kinds
+            if _words_of(name) & _FLAGS and _has_states(contents, name)
+        ],
+        "row numbers": [
+            name
+            for name, values in contents.numbers.items()
+            if _numbers_rows(name, values) or is_influx and name == "table"
+        ],
+    }
 
 
 def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times:
@@ -177,16 +160,18 @@ def _words_of(name: str) -> set[str]:
     return {*split, *("".join(pair) for pair in zip(split, split[1:], strict=False))}
 
 
-def _has_states(cells: pd.Series, kind: str) -> bool:
+def _has_states(contents: Contents, name: str) -> bool:
     """Whether a column has only a few values, which are whole numbers or words."""
-    if kind not in ("numbers", "words") or len(states := cells.dropna().unique()) > _MAX_STATES:
+    kind = contents.kinds[name]
+    if kind not in ("numbers", "words"):
+        return False
+    states = contents.frame[name].dropna().unique()
+    if len(states) > _MAX_STATES:
         return False
     return kind == "words" or not any(isinstance(state, float) and state % 1 for state in states)
 
 
-def _labels_of(
-    frame: pd.DataFrame, kinds: Mapping[str, str], asked: set[str], options: Cleaning
-) -> list[str]:
+def _labels_of(contents: Contents, asked: Collection[str], options: Cleaning) -> list[str]:
     """Returns the columns that label anomalous rows: those that the options name, or those whose
     name and values show it.
     """
@@ -194,10 +179,10 @@ def _labels_of(
         return [] if options.label_column == (NO_TIME,) else list(options.label_column)
     found = [
         name
-        for name, kind in kinds.items()
-        if name not in asked and _words_of(name) & _LABELS and _has_states(frame[name], kind)
+        for name in contents.kinds
+        if name not in asked and _words_of(name) & _LABELS and _has_states(contents, name)
     ]
-    return [*found, "mask"] if _LABELLED <= {*frame.columns} - asked else found
+    return [*found, "mask"] if _LABELLED <= set(contents.kinds) - set(asked) else found
 
 
 def _numbers_rows(name: str, values: np.ndarray) -> bool:
@@ -209,9 +194,14 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
     return len(known) == 1 or bool(len(known)) and bool(np.mean(np.diff(known) == 1) >= 0.9)
 
 
-def _counts(values: np.ndarray) -> bool:
-    """Whether values beside a clock count the rows from 0 or 1."""
-    return len(values) > 2 and values[0] in (0, 1) and bool((np.diff(values) == 1).all())
+def _counts(name: str, values: np.ndarray, clock: Clock) -> bool:
+    """Whether values beside a clock count the rows from 0 or 1, or those without a name are
+    different whole numbers and no times.
+    """
+    if clock.columns and len(values) > 2 and values[0] in (0, 1) and (np.diff(values) == 1).all():
+        return True
+    may_count = is_unnamed(name) and not is_epoch(values) and not (values % 1).any()
+    return may_count and len(np.unique(values)) == len(values)
 
 
 def anomalous(cells: pd.Series) -> np.ndarray | None:

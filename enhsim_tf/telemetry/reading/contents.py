@@ -45,9 +45,10 @@ class Contents:
         """The columns of a kind."""
         return [name for name, its_kind in self.kinds.items() if its_kind == kind]
 
-    def first_cells(self, name: str, num_cells: int = LOOK) -> pd.Series:
-        """The first cells of a column that are not missing, as text."""
-        return self.frame[name].dropna().iloc[:num_cells].astype("str")
+
+def first_cells(cells: pd.Series, most: int = LOOK) -> pd.Series:
+    """Returns the first cells that are not missing as text."""
+    return cells.dropna().iloc[:most].astype("str")
 
 
 def contents_of(
@@ -69,9 +70,7 @@ def contents_of(
     hexadecimal = {
         family
         for name, family in families.items()
-        if family != name
-        and kinds[name] == "words"
-        and _are_hex(frame[name].dropna().iloc[:LOOK].astype("str"))
+        if family != name and kinds[name] == "words" and _are_hex(first_cells(frame[name]))
     }
     kinds |= {name: "words" for name in kinds if families[name] in hexadecimal - {name}}
     numbers = {
