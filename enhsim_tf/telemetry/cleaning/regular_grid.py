@@ -127,11 +127,11 @@ def find_interval(times: np.ndarray) -> float:
     times have.
     """
     steps = np.sort(np.diff(times).astype(np.float64))
-    near = np.searchsorted(steps, _ALIKE[1] * steps, "right") - np.searchsorted(
-        steps, _ALIKE[0] * steps, "left"
-    )
-    most = steps[np.argmax(near)]
-    interval = float(np.median(steps[(_ALIKE[0] * most <= steps) & (steps <= _ALIKE[1] * most)]))
+    different = steps[np.append(True, np.diff(steps) > 0)]
+    begins = np.searchsorted(steps, _ALIKE[0] * different, "left")
+    ends = np.searchsorted(steps, _ALIKE[1] * different, "right")
+    most = np.argmax(ends - begins)  # the step that most others are like
+    interval = float(np.median(steps[begins[most] : ends[most]]))
     if regular_step_fraction(times, interval) < 0.9 and steps[-1] < 2 * steps[0]:
         # times that were cut, as 0, 2, 5, 7 of 0, 2.5, 5, 7.5, are never an interval off
         places = np.arange(len(times))
@@ -298,13 +298,13 @@ def _on_grids(
     if by_interval:
         middle = times[0] + places[firsts] * interval - times[firsts]
     else:
-        parts = pd.Series(off).groupby(part, sort=False)
-        low, middle, high = (parts.agg(name).to_numpy() for name in ("min", "median", "max"))
-        middle = np.where(
-            np.maximum(high - middle, middle - low) <= _MAX_JITTER * interval,
-            middle,
-            (low + high) / 2,
-        )
+        low = np.minimum.reduceat(off, firsts)
+        high = np.maximum.reduceat(off, firsts)
+        middle = (low + high) / 2
+        if (low < high).any():
+            median = pd.Series(off).groupby(part, sort=False).median().to_numpy()
+            is_near = np.maximum(high - median, median - low) <= _MAX_JITTER * interval
+            middle = np.where(is_near, median, middle)
     return rows.assign(part=part, place=place, off=off - middle[part]), times[firsts] + middle
 
 
@@ -330,6 +330,8 @@ def _mark_spread(off: np.ndarray, begins: np.ndarray, spread: float) -> None:
     """Marks further beginnings of parts, so that the distances from the grid within each part
     differ by at most `spread`.
     """
+    if np.ptp(off) <= spread:
+        return
     first = 0
     length = 64
     ends = np.append(np.flatnonzero(begins), len(off))
@@ -393,11 +395,14 @@ def _build_parts(
     for number, inside in rows.groupby("part"):
         places = inside["place"].to_numpy()
         values = inside["value"].to_numpy()
-        samples = np.arange(lengths[number])
-        previous = np.searchsorted(places, samples, "right") - 1
-        filled = values[previous] if holds else np.interp(samples, places, values)
-        rows_there = inside["row"].to_numpy()[previous]
-        parts.append(Part(begins[number], filled, rows_there, places[previous] == samples))
+        measured = np.zeros(lengths[number], bool)
+        measured[places] = True
+        previous = np.cumsum(measured) - 1
+        filled = values[previous]
+        if not holds:
+            gaps = np.flatnonzero(~measured)
+            filled[gaps] = np.interp(gaps, places, values)
+        parts.append(Part(begins[number], filled, inside["row"].to_numpy()[previous], measured))
     num_filled = int(lengths[~is_short].sum()) - len(rows)
     is_gap = (np.diff(rows["part"]) == 0) & (np.diff(rows["place"]) > 1)
     filled = "filled with the value before them," if holds else "filled by straight lines with"
