@@ -1307,6 +1307,21 @@ HALVES = [f'"{20 + k % 3},{5 * (k % 2)}"' for k in range(N)]
 # form: text, its channels
 ORDINARY = {
     "a line above the names": (table("time,v", UTC, VALUES, above="Rate,100\n"), ["v"]),
+    "numbers of channels above the names": (
+        table(
+            "time,v,w,x",
+            UTC,
+            *[VALUES] * 3,
+            above="Probe,Gain,Offset\n" + "".join(f"p{k},1,{k}\n" for k in range(3)),
+        ),
+        ["v", "w", "x"],
+    ),
+    "quotes above the names and a gap in the last column": (
+        table("time,v,w", UTC, VALUES, VALUES, above='5" tube\n').replace(
+            f",{VALUES[7]},{VALUES[7]}\n", f",{VALUES[7]},\n"
+        ),
+        ["v", "w"],
+    ),
     "depths that tell series apart": (
         table("time,depth,v", UTC.repeat(2), ["10 cm", "20 cm"] * N, range(2 * N)),
         ["10 cm", "20 cm"],

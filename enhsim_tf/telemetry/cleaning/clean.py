@@ -8,6 +8,7 @@ gaps are filled, and the series is split at long gaps. Input that cannot be inte
 import dataclasses
 import functools
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -37,6 +38,7 @@ from enhsim_tf.telemetry.series import (
     iso_time,
 )
 
+_LONGEST_NS = np.iinfo(np.int64).max  # between two times
 _MAX_NAMES = 120  # characters of the names of channels that a message has
 
 
@@ -118,9 +120,9 @@ def clean(
     if describe:
         describe_values(parts, values[np.isfinite(values)], log)
 
-    # samples are counted from 0; the clock of others begins with the first part
+    # a clock begins with the first part, and samples are counted from 0
     begin = -first if kind == SAMPLES else parts[0].begin
-    clock = Clock(interval / 1e9, first + round(begin), kind)
+    clock = Clock(interval / 1e9, 0 if kind == SAMPLES else first + round(begin), kind)
     telemetry = Telemetry(
         tuple(
             Part(
@@ -185,10 +187,11 @@ def _rows_with_times(
     counts = raw.times.counts
     zone = raw.times.zone
     local = raw.times.stamps.tz is None
-    in_zone = options.timezone if local else None
-    times, kept, first, since, is_rising = _in_order(raw.times, in_zone)
+    ordered = _in_order(raw.times, options.timezone if local else None)
+    times = ordered.of_all
+    has_all = len(ordered.rows) == len(times)
     log = CleaningLog(list(raw.findings), raw.places, times, counts)
-    if len(kept) < len(times):
+    if not has_all:
         bad = raw.times.bad
         had_time = raw.times.stamps.notna()
         for kind, mask, text in (
@@ -201,11 +204,17 @@ def _rows_with_times(
             ),
         ):
             log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}")
-    if not len(kept):
+    if not len(ordered.rows):
         raise InputError(
             f"Expected rows with times. Received: none in {raw.name}. Name another time column."
         )
-    if not is_rising:
+    if ordered.last - ordered.first > _LONGEST_NS:
+        raise ClockError(
+            "Expected times within 292 years of each other. Received: times from "
+            f"{iso_time(ordered.first)} to {iso_time(ordered.last)} in {raw.name}.",
+            otherwise="a part of them",
+        )
+    if not ordered.is_rising:
         has_time = times != pd.NaT.value
         # rows that are there twice, as where exports overlap, do no harm
         twice = pd.DataFrame({"time": times, "value": values}).duplicated()
@@ -219,38 +228,40 @@ def _rows_with_times(
         zone = f"{options.timezone or 'UTC'}, as none is stated"
     elif options.timezone and zone != "none":
         zone = f"{zone}, which goes before {options.timezone}"
-    if (np.diff(kept) < 0).any():
-        early = np.flatnonzero(times < np.maximum.accumulate(times))
-        early = early[has_time[early]]
-        log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
-    last = first + int(since[-1])
     span = (
-        f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s"
+        f"from {ordered.first / 1e9:.10g} s to {ordered.last / 1e9:.10g} s"
         if counts
-        else f"from {iso_time(first)} to {iso_time(last)}"
+        else f"from {iso_time(ordered.first)} to {iso_time(ordered.last)}"
     )
     text = f"the clock is {raw.clock}: {raw.times.form}, zone {zone}, {span}"
     details = {"column": raw.clock, "form": raw.times.form, "zone": zone, "counts": counts}
-    details |= {"first_ns": first, "last_ns": last}
+    details |= {"first_ns": ordered.first, "last_ns": ordered.last}
     log.findings.insert(0, Finding("clock", 1, text, details=details))
-    is_same = is_rising and len(kept) == len(values)
-    columns = {"time": since, "value": values if is_same else values[kept], "row": kept}
-    return log, pd.DataFrame(columns, copy=False), first
+    in_order = values if has_all and ordered.is_rising else values[ordered.rows]
+    columns = {"time": ordered.since, "value": in_order, "row": ordered.rows}
+    return log, pd.DataFrame(columns, copy=False), ordered.first
+
+
+class _Ordered(NamedTuple):
+    """The times of a table in nanoseconds, and its rows in chronological order."""
+
+    of_all: np.ndarray  # times of all rows in the order of the source
+    rows: np.ndarray  # the rows that have a time, in chronological order
+    since: np.ndarray  # their times since the first
+    first: int
+    last: int
+    is_rising: bool  # whether each of them is later than the one before it in the source
 
 
 @functools.lru_cache(1)
-def _in_order(
-    times: Times, zone: str | None
-) -> tuple[np.ndarray, np.ndarray, int, np.ndarray, bool]:
-    """Returns the times of all rows in nanoseconds; the rows that have one in chronological order,
-    their first time, and their times since that; whether each row is later than the one before it
-    in the source. The last result is kept for the other channels of a table.
-    """
+def _in_order(times: Times, zone: str | None) -> _Ordered:
+    """Orders the rows of a table. The last result is kept for the other channels of the table."""
     stamps = times.stamps if zone is None else localize_times(times.stamps, zone)
-    all_times = stamps.as_unit("ns").asi8
+    of_all = stamps.as_unit("ns").asi8
     rows = np.flatnonzero(stamps.notna())
-    steps = np.diff(all_times[rows])
+    steps = np.diff(of_all[rows])
     if (steps < 0).any():
-        rows = rows[np.argsort(all_times[rows], kind="stable")]
-    first = int(all_times[rows[0]]) if len(rows) else 0
-    return all_times, rows, first, all_times[rows] - first, bool((steps > 0).all())
+        rows = rows[np.argsort(of_all[rows], kind="stable")]
+    ordered = of_all[rows]
+    first, last = (int(ordered[0]), int(ordered[-1])) if len(rows) else (0, 0)
+    return _Ordered(of_all, rows, ordered - first, first, last, bool((steps > 0).all()))

@@ -131,7 +131,9 @@ def read_table_channels(
 def _several_series(
     table: Table, keys: Sequence[str], layout: Layout, leave_out_empty: bool, what: str
 ) -> tuple[dict[str, tuple[str, np.ndarray]], list[Finding]]:
-    """Returns the column and the rows of each of several series by its name, and findings."""
+    """Returns the column and the rows of each of several series by its name, without those that
+    have no numbers if `leave_out_empty`, and findings.
+    """
     channels = [name for name in layout.channels if name not in keys]
     chosen = _name_series(table.frame, keys, channels, what)
     findings = []

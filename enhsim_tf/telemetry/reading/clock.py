@@ -75,8 +75,10 @@ def _seconds_of(spans: pd.Series) -> np.ndarray:
 
 def find_clock(table: Contents) -> Clock:
     """Finds the clock of a table; refuses one in which several columns may be it, or one of which
-    only the values speak for it. The numbers of the table are without those of columns that are
-    asked for as channels.
+    only the values speak for it.
+
+    The table is without columns that are told otherwise, and its numbers without those of columns
+    that are asked for as channels.
     """
     frame = table.frame
     numbers = table.numbers

@@ -90,7 +90,9 @@ def lay_out(
     if times is not None and not times.zone and options.timezone is None:
         refuse_other_zone(times, {name: numbers[name] for name in further & set(numbers)}, what)
     free_numbers = {name: values for name, values in numbers.items() if name not in roles}
-    counted = [name for name, values in free_numbers.items() if _counts(name, values, clock)]
+    counted = [
+        name for name, values in free_numbers.items() if _counts(name, values, bool(clock.columns))
+    ]
     # if the only column counts, it is the channel
     if len(counted) < sum(not roles.get(name) for name in numbers):
         _take(roles, {"row numbers": counted})
@@ -115,8 +117,8 @@ def _take(roles: dict[str, str], names_by_role: Mapping[str, Iterable[str]]) -> 
 def _roles_without_clock(
     contents: Contents, asked: Collection[str], options: Cleaning
 ) -> dict[str, Iterable[str]]:
-    """Returns the columns that are told by their names and values alone, by their roles; the first
-    role of a column counts.
+    """Returns the columns that are told by their names and values alone, by their roles. A column
+    of several roles has the first of them.
     """
     names = set(contents.kinds)
     is_written = any(marks <= names for marks in _WRITTEN)
@@ -194,14 +196,14 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
     return len(known) == 1 or bool(len(known)) and bool(np.mean(np.diff(known) == 1) >= 0.9)
 
 
-def _counts(name: str, values: np.ndarray, clock: Clock) -> bool:
-    """Whether values beside a clock count the rows from 0 or 1, or those without a name are
-    different whole numbers and no times.
+def _counts(name: str, values: np.ndarray, has_clock: bool) -> bool:
+    """Whether a column numbers the rows by its values: it counts from 0 or 1 beside a clock, or it
+    has no name and holds different whole numbers that are no times.
     """
-    if clock.columns and len(values) > 2 and values[0] in (0, 1) and (np.diff(values) == 1).all():
+    if has_clock and len(values) > 2 and values[0] in (0, 1) and (np.diff(values) == 1).all():
         return True
-    may_count = is_unnamed(name) and not is_epoch(values) and not (values % 1).any()
-    return may_count and len(np.unique(values)) == len(values)
+    is_whole = is_unnamed(name) and not is_epoch(values) and not (values % 1).any()
+    return is_whole and len(np.unique(values)) == len(values)
 
 
 def anomalous(cells: pd.Series) -> np.ndarray | None:

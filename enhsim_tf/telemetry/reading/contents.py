@@ -54,8 +54,8 @@ def first_cells(cells: pd.Series, most: int = LOOK) -> pd.Series:
 def contents_of(
     table: Table, asked: Collection[str], time_format: str | None, what: str
 ) -> Contents:
-    """Says what the columns of a table hold; those that are asked for as channels are no dates of
-    the time format.
+    """Says what the columns of a table hold. Those that fit the time format hold dates, unless they
+    are asked for as channels.
     """
     frame = table.frame
     kinds = {name: _kind_of(frame[name]) for name in frame.columns}
@@ -169,6 +169,7 @@ def _turn_hex(head: pd.Series, cells: pd.Series) -> bool:
 
 
 def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
+    """Returns the values of a column of numbers, NaN where they are missing or cannot be read."""
     if is_text(cells) or isinstance(cells.dtype, pd.CategoricalDtype):
         return parse_numbers(cells, "", drop=True, decimal=decimal)[0]
     return cells.to_numpy(np.float64, na_value=np.nan)

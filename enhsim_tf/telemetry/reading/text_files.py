@@ -107,7 +107,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 f"lines before the data that were skipped: {dialect.skipped:,}",
             )
         )
-    begin = line_start(text, dialect.first_line)  # a copy of what follows costs time
+    begin = line_start(text, dialect.first_line)  # which costs less than a copy of the data
     if not _FILLED(text, begin):
         raise InputError(
             f"Expected rows below the header. Received: only names in {name}, "
@@ -153,7 +153,8 @@ def _may_be_ragged(frame: pd.DataFrame, text: bytes, begin: int, dialect: Dialec
     """
     num_separators = (len(dialect.names) - 1) * len(frame)
     return bool(frame.iloc[:, -1].isna().any()) and (
-        b'"' in text or text.count(dialect.separator.encode(), begin) != num_separators
+        text.find(b'"', begin) >= 0
+        or text.count(dialect.separator.encode(), begin) != num_separators
     )
 
 
