@@ -735,6 +735,11 @@ REFUSED = {
         {"options": Cleaning(skip_rows=4)},
         60,
     ),
+    "numbered places one after the other": (
+        table("location_id,time,v", [0] * N, UTC, VALUES)
+        + table("location_id,time,v", [1] * N, UTC, VALUES).partition("\n")[2],
+        "--series-column location_id",
+    ),
     "a zone beside the table": (
         table("time,v", MINUTES, VALUES, above="zone\nEurope/Berlin\n\n"),
         "--timezone Europe/Berlin",

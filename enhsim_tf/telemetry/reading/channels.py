@@ -417,7 +417,7 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
             pd.api.types.is_integer_dtype(cells.dtype)
             and layout.channels != (name,)
             and 1 < cells.nunique() <= _MAX_SERIES
-            and not cells.is_monotonic_increasing
+            and (_is_named(name) or not cells.is_monotonic_increasing)
             and _repeating(frame, [name], times) < 0.02
             and not 0 < len(jumps) < np.count_nonzero(np.diff(cells))
         ):
