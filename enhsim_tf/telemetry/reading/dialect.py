@@ -21,8 +21,7 @@ _SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal sign
 _HEAD_LINES = 300
 HEAD = 4_000_000
 _LOOK = 50  # columns that are inspected
-_FEWEST_ROWS = 10  # with numbers above the names, below which they are no table
-_FEWEST_NAMED = 3  # the same below names of their own
+_FEWEST_ROWS = 10  # with numbers above the names, below which they are no table without its own
 csv.field_size_limit(HEAD)  # with another separator than its own, a line is one cell
 _NUMBER = (
     r"(?:[+-] *)?(?:\d[\d.,'\u2019 \u00a0\u202f]*|[.,]\d+)(?:[de][+-]?\d+)?"
@@ -162,21 +161,19 @@ def _refuse_other_table(found: Dialect, name: str, skip_rows: int) -> None:
     """Refuses a text in which another table stands above the one that was found."""
     rows = _split(found.above, found.separator)
     marks = [[bool(_SOLID.match(cell)) for cell in row] for row in rows]
-    of_data = [
-        number for number, row in enumerate(marks) if len(row) > 1 and 4 * sum(row) >= 3 * len(row)
-    ]
-    # below a line of as many names
-    named = [
-        number
-        for number, row in enumerate(marks[:-_FEWEST_NAMED])
-        if rows[number]
-        and not any(row)
-        and all(
-            place in of_data and marks[place][0] and len(marks[place]) == len(row)
-            for place in range(number + 1, number + 1 + _FEWEST_NAMED)
-        )
-    ]
-    if named or len(of_data) >= _FEWEST_ROWS:
+
+    def is_data(row: Sequence[bool]) -> bool:
+        return len(row) > 1 and 4 * sum(row) >= 3 * len(row)
+
+    of_data = [number for number, row in enumerate(marks) if is_data(row)]
+    # a line of names, and three rows of as many cells below it
+    has_names = any(
+        names
+        and not any(names)
+        and all(is_data(row) and row[0] and len(row) == len(names) for row in below)
+        for names, *below in zip(marks, marks[1:], marks[2:], marks[3:], strict=False)
+    )
+    if has_names or len(of_data) >= _FEWEST_ROWS:
         raise InputError(
             f"Expected one table. Received: {len(of_data)} lines with numbers above the names of "
             f"another table in {name}.",
