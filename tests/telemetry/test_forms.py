@@ -69,6 +69,14 @@ READ = {
         table("Date,Hour,Minute,v", *(stamps(form) for form in ("%Y%m%d", "%H", "%M")), VALUES),
         START,
     ),
+    "a compact date that is named by its form": (
+        table("YYYYMMDD,HH,mm,v", *(stamps(form) for form in ("%Y%m%d", "%H", "%M")), VALUES),
+        START,
+    ),
+    "a line of words above the names": (
+        table("Time;v", SECONDS, VALUES, separator=";", above="Device;ABC\n"),
+        ZERO,
+    ),
     "a line of formats": (
         table(
             "agency_cd\tdatetime\t69928_00060\n5s\t20d\t14n",
@@ -1080,12 +1088,14 @@ def test_quality_flags_and_counts_beside_a_clock_are_named_and_left_out():
     report = check(
         only(
             read_source(
-                pd.DataFrame({"time": TIMES, "v": VALUES, "v_quality": 192, "number": range(N)})
+                pd.DataFrame(
+                    {"time": TIMES, "v": VALUES, "v_quality": 192, "QN_9": 3, "number": range(N)}
+                )
             )
         )
     )
     assert (
-        "v_quality" in report.find("quality flags").text
+        "v_quality, QN_9" in report.find("quality flags").text
         and "number" in report.find("row numbers").text
     )
 

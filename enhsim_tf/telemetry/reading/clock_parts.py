@@ -186,8 +186,8 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
     plain = {name: re.sub(r"\W|_", "", name.casefold()) for name in numbers}
     for name, word in plain.items():
         part = _PART_OF.get(word)
-        # the second of `MM` and `mm`
-        if word == "mm" and {"month", "doy"} & set(found):
+        # behind `MM` or `HH`
+        if word == "mm" and {"month", "doy", "hour"} & set(found):
             part = "minute"
         if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
             found.setdefault(part, name)

@@ -13,6 +13,7 @@ from typing import NoReturn
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding
+from enhsim_tf.telemetry.reading.column_names import UNIT_OF, name_tells
 
 BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
 _WHOLE = ""  # the separator of files of one column
@@ -303,8 +304,11 @@ def _names_of(
     """Returns the names and the units in a block of lines above the first row of data; fewer names
     than columns if a sample of the data has values in the others.
     """
-    # the line of the most different names, of several the first
-    header = max(range(len(block)), key=lambda number: len({*block[number]} - {""}))
+    # the line of the most different names, of several the first that names a clock, or the first
+    header = max(
+        range(len(block)),
+        key=lambda number: (len({*block[number]} - {""}), any(map(_names_clock, block[number]))),
+    )
     given = block[header]
     if mark == BLANKS and below and len(given) == width - 1:
         # a date and a time of day below one name
@@ -320,6 +324,10 @@ def _names_of(
     for row in (*block[:header], *block[header + 1 :]):
         names = [name or other for name, other in itertools.zip_longest(names, row, fillvalue="")]
     return names, block[header + 1] if header + 1 < len(block) else ()
+
+
+def _names_clock(cell: str) -> bool:
+    return cell.casefold() not in UNIT_OF and name_tells(cell)[0] == 2
 
 
 def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
