@@ -70,7 +70,7 @@ READ = {
         START,
     ),
     "a compact date that is named by its form": (
-        table("YYYYMMDD,HH,mm,v", *(stamps(form) for form in ("%Y%m%d", "%H", "%M")), VALUES),
+        table("YYYYMMDD,HH,Minute,v", *(stamps(form) for form in ("%Y%m%d", "%H", "%M")), VALUES),
         START,
     ),
     "a line of words above the names": (

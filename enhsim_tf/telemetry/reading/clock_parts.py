@@ -3,7 +3,7 @@ and hours, seconds and their fractions.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,48 +50,65 @@ def joined_clock(table: Contents, dates: list[str]) -> Clock | None:
     numbers, make together, or None.
     """
     frame = table.frame
-    numbers = table.numbers
     hours = without_ends(table.of_kind("times of day"))
     if len(dates) != 1 or len(hours) > 1:
         return None
     cells = frame[dates[0]]
-    if dates[0] in numbers:
-        text = numbers[dates[0]].astype(np.int64).astype(str)
+    if dates[0] in table.numbers:
+        text = table.numbers[dates[0]].astype(np.int64).astype(str)
         cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
     is_day = are_days(cells)
-    has_zone = isinstance(cells.dtype, pd.DatetimeTZDtype)  # far dates have no text with one
-    head = first_cells(cells.dt.tz_convert(None) if has_zone else cells)
-    whole_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
-    parts = {part: name for part, name in _parts_of(numbers).items() if part in _MOST}
-    below = {part: name for part, name in parts.items() if part in _FRACTIONS}
-    if hours and is_day:
-        lacks = first_cells(frame[hours[0]]).str.fullmatch(r" *\d\d?:\d\d *")
-        has_seconds = "second" in parts and np.nanmax(numbers[parts["second"]]) <= _MOST["second"]
-        parts = ({"second": parts["second"]} if lacks.all() and has_seconds else {}) | below
-    elif not is_day and below and whole_seconds:
-        parts = below
-    elif not is_day or "hour" not in parts:
-        parts = {}
-    elif "second" not in parts:
-        parts = {part: name for part, name in parts.items() if part not in below}
+    parts = _parts_beside(table, cells, hours, is_day)
     texts: list[str] = []
     if hours and is_day:
-        texts = hours + [
+        halves = [
             name
             for name in table.of_kind("words")
             if frame[name].dropna().isin(["AM", "PM", "am", "pm"]).all()
         ]
-        if pd.api.types.is_datetime64_any_dtype(cells.dtype):
-            cells = cells.dt.strftime("%Y-%m-%d")
-        # a date may stand in the first row of each day only
-        cells = cells.astype("str").str.strip().ffill()
-        for name in texts:
-            cells = cells + " " + frame[name].astype("str").str.strip()
-    added = _added(numbers, parts)
+        texts = [*hours, *halves]
+        cells = _with_texts(cells, frame[texts])
+    added = _added(table.numbers, parts)
     if parts and parts.keys() <= _FRACTIONS.keys() and not _makes_alike(cells, added):
         parts, added = {}, None
     columns = (dates[0], *texts, *parts.values())
     return Clock(columns, cells, added) if len(columns) > 1 else None
+
+
+def _parts_beside(
+    table: Contents, dates: pd.Series, hours: Sequence[str], is_day: bool
+) -> dict[str, str]:
+    """Returns the columns of whole numbers by the parts of the time that they add to dates, or to
+    dates and times of day.
+    """
+    parts = {part: name for part, name in _parts_of(table.numbers).items() if part in _MOST}
+    fractions = {part: name for part, name in parts.items() if part in _FRACTIONS}
+    if hours and is_day:
+        has_minutes = first_cells(table.frame[hours[0]]).str.fullmatch(r" *\d\d?:\d\d *").all()
+        second = parts.get("second")
+        if second and has_minutes and np.nanmax(table.numbers[second]) <= _MOST["second"]:
+            return {"second": second} | fractions
+        return fractions
+    if is_day and "hour" in parts:
+        # what is smaller than a second belongs to one
+        return {
+            part: name for part, name in parts.items() if part not in fractions or "second" in parts
+        }
+    has_zone = isinstance(dates.dtype, pd.DatetimeTZDtype)  # far dates have no text with one
+    head = first_cells(dates.dt.tz_convert(None) if has_zone else dates)
+    has_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
+    return fractions if not is_day and has_seconds else {}
+
+
+def _with_texts(dates: pd.Series, texts: pd.DataFrame) -> pd.Series:
+    """Returns dates with what stands beside them in text."""
+    if pd.api.types.is_datetime64_any_dtype(dates.dtype):
+        dates = dates.dt.strftime("%Y-%m-%d")
+    # a date may stand in the first row of each day only
+    cells = dates.astype("str").str.strip().ffill()
+    for name in texts:
+        cells = cells + " " + texts[name].astype("str").str.strip()
+    return cells
 
 
 def clock_of_parts(table: Contents) -> Clock | None:
@@ -186,8 +203,8 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
     plain = {name: re.sub(r"\W|_", "", name.casefold()) for name in numbers}
     for name, word in plain.items():
         part = _PART_OF.get(word)
-        # behind `MM` or `HH`
-        if word == "mm" and {"month", "doy", "hour"} & set(found):
+        # the second of `MM` and `mm`
+        if word == "mm" and {"month", "doy"} & set(found):
             part = "minute"
         if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
             found.setdefault(part, name)
