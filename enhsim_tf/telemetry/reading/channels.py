@@ -369,14 +369,14 @@ def _is_key(
     times = times[known]
     codes = codes[known]
     spans = pd.Series(times).groupby(codes).agg(np.ptp)
-    # every series covers at least half of the whole time
-    overlap = (spans >= 0.5 * np.ptp(times)).all()
+    if (spans < 0.5 * np.ptp(times)).any():  # not all cover the same time
+        return False
     changes = np.diff(codes) != 0
-    back = (np.diff(times) < 0) & changes
-    if overlap and back.sum() >= max(1, codes.max()) / 2 and changes.sum() < 2 * (codes.max() + 1):
-        return True
+    last = codes.max()
+    if changes.sum() < 2 * (last + 1):  # one below the other
+        return bool(((np.diff(times) < 0) & changes).sum() >= max(1, last) / 2)
     is_word = not frame[name].dropna().astype("str").str.match(r"\s*[+-]?\d").any()
-    if what is not None and is_word and changes.mean() > 0.5 and overlap:
+    if what is not None and is_word and changes.mean() > 0.5:
         raise InputError(
             "Expected one series, or to know what tells several apart. Received: words that "
             f"change from row to row in {name!r} of {what}.",
