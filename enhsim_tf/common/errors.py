@@ -10,6 +10,7 @@ from typing import Any
 _MAX_CHARACTERS = 600
 _END = 150
 _MOST_OPTIONS = 6  # in a message
+_LONGEST_OPTION = 300  # characters, so that it is there in whole
 MANY = 8
 """Channels, above which a line of a report names only as many, and what is alike is said once."""
 # options whose names differ
@@ -36,7 +37,8 @@ class InputError(ValueError):
     Args:
         message: Description of the problem.
         options: What may be given instead, each as values of options of reading by their names in
-            Python. The message ends with them as a command takes them.
+            Python, without those of more than 300 characters. The message ends with them as a
+            command takes them.
         otherwise: What else to do, after the options.
     """
 
@@ -45,7 +47,9 @@ class InputError(ValueError):
     ):
         self.message = _one_line(str(message))
         self.otherwise = otherwise
-        self.options = tuple(map(dict, options))
+        self.options = tuple(
+            dict(option) for option in options if len(option_text(option)) <= _LONGEST_OPTION
+        )
         ways = [*map(option_text, self.options[:_MOST_OPTIONS]), *filter(None, [otherwise])]
         line = _one_line(f"{message} Give {', or '.join(ways)}.") if ways else self.message
         if len(line) > _MAX_CHARACTERS:

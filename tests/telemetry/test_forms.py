@@ -77,6 +77,18 @@ READ = {
         table("Time;v", SECONDS, VALUES, separator=";", above="Device;ABC\n"),
         ZERO,
     ),
+    "the beginning and the end of samples without length, each as a date and a time": (
+        table("day,clock,day2,clock2,v", *(stamps(form) for form in ("%F", "%T") * 2), VALUES),
+        START,
+    ),
+    "bars at the end of the lines above the data": (
+        table("DATE TIME v |", MINUTES, VALUES, separator=" ", above="station |\nlength 1 |\n"),
+        START,
+    ),
+    "parts of the time beside it": (
+        table("time,year,DOY,v", MINUTES, stamps("%Y"), stamps("%j"), VALUES),
+        START,
+    ),
     "a line of formats": (
         table(
             "agency_cd\tdatetime\t69928_00060\n5s\t20d\t14n",
@@ -490,8 +502,32 @@ ASKED = {
         {"options": Cleaning(time_format="%Y%m%d%H")},
         3_600,
     ),
+    "times of day alone": (
+        table("clock,v", stamps("%H:%M:%S"), VALUES),
+        "--time-format %H:%M:%S",
+        {"options": Cleaning(time_format="%H:%M:%S")},
+        60,
+    ),
+    "a clock behind a counter": (
+        table("Pt,T,v", range(N), SECONDS, VALUES),
+        "--time T",
+        {"time": "T"},
+        60,
+    ),
+    "a clock that says more in its name": (
+        table("n,time approx (s),v", range(N), SECONDS + np.arange(N) % 2, VALUES),
+        "--time 'time approx (s)'",
+        {"time": "time approx (s)"},
+        60,
+    ),
+    "columns below lines of text": (
+        table("[DATA]", MINUTES, VALUES, separator="\t", above="STATION 1\n[HEADER]\nheight = 3\n"),
+        "--no-header",
+        {"options": Cleaning(no_header=True)},
+        60,
+    ),
     "two clocks": (
-        table("event_time,received_time,v", MINUTES, MINUTES, VALUES),
+        table("event_time,received_time,v", MINUTES, stamps("%Y-%m-%d %H:%M:01"), VALUES),
         "event_time, received_time",
         {"time": "event_time"},
         60,
@@ -516,6 +552,15 @@ REFUSED = {
         ),
         "sadf -d",
     ),
+    "frames of a CAN bus": (
+        "".join(f"({second}.25) can0 1A0#00FF\n" for second in SECONDS),
+        "DBC",
+    ),
+    "vectors in brackets": (
+        "# Forces\n" + "".join(f"{value}\t((1 2 3) (4 5 6))\n" for value in VALUES),
+        "without brackets",
+    ),
+    "a page": ("<!DOCTYPE html>\n<table>\n" + table("time,v", UTC, VALUES), "pandas.read_html"),
     "a log of a serial monitor": (
         table("00:00:00.012 -> 20.1", stamps("%H:%M:%S.012"), VALUES, separator=" -> "),
         "a comma instead of ' -> '",
@@ -752,6 +797,12 @@ REFUSED = {
         table("time,v", MINUTES, VALUES, above="zone\nEurope/Berlin\n\n"),
         "--timezone Europe/Berlin",
         {"options": Cleaning(timezone="Europe/Berlin")},
+        60,
+    ),
+    "a clock before each signal, behind a column of marks": (
+        table("mark,TIME,v,TIME,w", ["x"] * N, SECONDS, VALUES, SECONDS + 40, VALUES),
+        "--time TIME.2 --column w",
+        {"time": "TIME.1", "columns": ["v"]},
         60,
     ),
     "an index without a name that varies": (
@@ -1467,11 +1518,34 @@ def test_rows_that_were_chosen_from_a_frame_are_no_channel():
     assert list(read_source(frame[frame["v"] > 16])) == ["v"]
 
 
-def test_an_index_may_be_named_like_a_column(refused):
+def test_times_since_1970_and_since_the_start_are_one_clock():
+    frame = {"timestamp": 1.7e9 + SECONDS, "lap": VALUES, "elapsed_time": SECONDS, "v": -VALUES}
+    assert list(read_source(pd.DataFrame(frame))) == ["lap", "v"]
+
+
+def test_whole_numbers_that_differ_are_a_channel_where_no_column_has_a_name(tmp_path):
+    numbers = np.random.default_rng(0).permutation(1_000)[:N]
+    (tmp_path / "a.csv").write_text(table("", numbers, VALUES).lstrip())
+    channels = read_source(tmp_path / "a.csv", options=Cleaning(no_header=True))
+    assert list(channels) == ["column 0", "column 1"]
+
+
+def test_a_note_says_how_states_beside_channels_are_read():
+    frame = pd.DataFrame({"time": TIMES, "v": VALUES, "valve": ["open"] * 20 + ["closed"] * 40})
+    assert "--states" in clean(only(read_source(frame))).report.find("columns left out").text
+
+
+def test_an_option_that_is_too_long_for_a_message_is_none(refused):
+    names = [f"a channel with a long name {number}" for number in range(10)]
+    frame = pd.DataFrame({name: VALUES for name in names}).assign(time=TIMES)
+    with refused("or other names") as found:
+        read_source(pd.concat([frame, frame[names[:1]]], axis=1))
+    assert found.value.options == tuple({"columns": [f"{names[0]}.{k}"]} for k in (1, 2))
+
+
+def test_an_index_may_be_named_like_a_column():
     frame = pd.DataFrame({"time": TIMES, "v": VALUES}).set_index("time", drop=False)
-    with refused("--time time.1"):
-        read_source(frame)
-    assert list(read_source(frame, time="time.1")) == ["v"]
+    assert list(read_source(frame)) == list(read_source(frame, time="time.1")) == ["v"]
 
 
 def test_a_short_row_below_no_header_moves_no_value(tmp_path, refused):

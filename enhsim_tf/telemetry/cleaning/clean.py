@@ -39,7 +39,6 @@ from enhsim_tf.telemetry.series import (
 )
 
 _LONGEST_NS = np.iinfo(np.int64).max  # between two times
-_MAX_NAMES = 120  # characters of the names of channels that a message has
 
 
 @dataclasses.dataclass(frozen=True)
@@ -172,8 +171,7 @@ def clean_all(
         failed.update(errors)
     elif errors:
         error = next(iter(errors.values()))
-        is_short = 0 < sum(map(len, cleaned)) <= _MAX_NAMES
-        others = [{"columns": list(cleaned)}] if is_short else []
+        others = [{"columns": list(cleaned)}] if cleaned else []
         raise InputError(error.message, [*error.options, *others], error.otherwise) from None
     return cleaned
 

@@ -93,12 +93,15 @@ def read_table_channels(
             f"Expected channels of different names. Received: {', '.join(several[:8])} in {what}, "
             "numbered here.",
             [{"columns": list(layout.channels)}, *({"columns": [name]} for name in several[:4])],
+            "other names",
         )
     keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]
     findings = list(table.findings)
     for kind, text in _SAID.items():
         used = (*keys, *(layout.words if options.states else ()))
         if names := [name for name in layout.left_out.get(kind, ()) if name not in used]:
+            if any(name in layout.words and _is_state(table.frame[name]) for name in names):
+                text += " (--states reads states)"
             findings.append(Finding(kind, len(names), f"{text}: {', '.join(names[:8])}"))
     if keys:
         chosen, noted = _several_series(table, keys, layout, columns is None, what)

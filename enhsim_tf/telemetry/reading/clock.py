@@ -29,6 +29,7 @@ from enhsim_tf.telemetry.reading.clock_parts import (
     clock_of_fractions,
     clock_of_parts,
     joined_clock,
+    parts_of,
     seconds_and_fractions,
 )
 from enhsim_tf.telemetry.reading.clock_values import (
@@ -45,12 +46,13 @@ from enhsim_tf.telemetry.reading.column_names import (
     BESIDE,
     UNIT_OF,
     is_unnamed,
+    mentions_time,
     name_tells,
     tells_time_of,
     without_ends,
     words_of,
 )
-from enhsim_tf.telemetry.reading.contents import Contents, first_cells
+from enhsim_tf.telemetry.reading.contents import Contents, different, first_cells
 
 # instead of the name of a time column: the table has no times, and samples are counted
 NO_TIME = "none"
@@ -65,6 +67,12 @@ _ZONE = re.compile(r"\b(?:CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylig
 _TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(?!\d).*"
 _WITH_YEAR = re.compile(r"\d:\d\d.*\b20\d\d|\b20\d\d.*\d:\d\d")
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
+# formats of times of day, which begin with 1900, by their digits as 1
+_FORMS_OF_DAY = {
+    "1:1": ("%H:%M", "%M:%S"),
+    "1:1:1": ("%H:%M:%S",),
+    "1:1:1.1": ("%H:%M:%S.%f",),
+}
 _ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
 
 
@@ -84,7 +92,7 @@ def find_clock(table: Contents) -> Clock:
     numbers = table.numbers
     tells = {name: name_tells(name)[0] for name in table.kinds}
     varying = _varying(table)
-    dates = without_ends(varying or table.of_kind("dates")[:1])
+    dates = different(frame, without_ends(varying or table.of_kind("dates")[:1]))
     compact = [
         name
         for name, values in numbers.items()
@@ -138,10 +146,13 @@ def _unclear_clock(table: Contents, tells: Mapping[str, int]) -> Clock:
     """
     for name, kind in table.kinds.items():
         if kind == "times of day":
+            cell = table.frame[name].dropna().iloc[0]
+            forms = (
+                _FORMS_OF_DAY.get(re.sub(r"\d+", "1", cell), ()) if isinstance(cell, str) else ()
+            )
             raise InputError(
-                "Expected times with a date. Received: "
-                f"{str(table.frame[name].dropna().iloc[0])!r} in {name!r} of {table.what}.",
-                [_COUNT],
+                f"Expected times with a date. Received: {str(cell)!r} in {name!r} of {table.what}.",
+                [*({"time_format": form} for form in forms), _COUNT],
                 "a column of dates",
             )
         if tells[name] == 2 and kind == "words":
@@ -216,6 +227,8 @@ def _refuse_unknown(table: Contents) -> None:
         name
         for name, values in numbers.items()
         if is_regular(values)
+        or mentions_time(name)
+        and is_increasing(values)
         or is_unnamed(name)
         and "column 1" not in kinds  # no column has a name
         and is_increasing(values)
@@ -231,12 +244,18 @@ def _refuse_unknown(table: Contents) -> None:
     ramp = next(iter(ramps), next(in_order, None))
     if ramp is not None and len(table.of_kind("numbers")) > 1:
         step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
+        named = [name for name in ramps if name != ramp and mentions_time(name)]
+        clocks = [ramp, *(named or ramps[1:])[:1]]
         raise InputError(
             f"Expected to know the clock. Received: {ramp!r} of {table.what}, which increases in "
             f"steps of {step:g}, as a clock or a counter does.",
             [
-                {"time": ramp},
-                *([] if is_epoch(numbers[ramp]) else [{"time": ramp, "time_format": "ms"}]),
+                *({"time": name} for name in clocks),
+                *(
+                    {"time": name, "time_format": "ms"}
+                    for name in clocks
+                    if not is_epoch(numbers[name])
+                ),
                 _COUNT,
             ],
         )
@@ -365,27 +384,39 @@ def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:
         (frame[name] == frame[first]).all()
         if kinds[first] == "dates"
         else is_nearly(numbers[first], numbers[name])
+        # times since 1970 and since the start
+        or is_epoch(numbers[first]) != is_epoch(numbers[name])
+        and shows_time(numbers[first], numbers[name])
         for name in others
     ):
         raise InputError(
             f"Expected one clock. Received: {len(groups)} in {table.what}, each with signals of "
             f"its own ({', '.join(list(groups)[:4])}).",
             [{"time": name, "columns": group} for name, group in groups.items()],
+            "each clock with its signals as a file",
         )
 
 
 def _signals_of(kinds: Mapping[str, str], clocks: Collection[str]) -> dict[str, list[str]]:
     """Returns the columns of numbers behind each of several clocks, up to the next one; nothing
-    unless the first column is a clock and each clock has a signal.
+    unless each clock has a signal, and each signal a clock.
     """
     groups: dict[str, list[str]] = {}
     for name, kind in kinds.items():
         if name in clocks:
             groups[name] = []
-        elif groups and kind == "numbers":
+        elif groups and kind in ("numbers", "words"):
             groups[list(groups)[-1]].append(name)
-    is_whole = len(groups) > 1 and all(groups.values()) and next(iter(kinds)) in groups
-    return groups if is_whole else {}
+        elif kind == "numbers":
+            return {}
+    if not all(groups.values()):
+        return {}
+    of_numbers = {
+        clock: [name for name in names if kinds[name] == "numbers"]
+        for clock, names in groups.items()
+    }
+    found = {clock: names for clock, names in of_numbers.items() if names}
+    return found if len(found) > 1 else {}
 
 
 def _is_named_clock(name: str, values: np.ndarray) -> bool:
@@ -407,6 +438,12 @@ def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[st
                 if _may_be_clock(name_tells(name)[0], values)
             ),
         )
+    for part, name in parts_of(numbers).items():
+        if (
+            hasattr(times.stamps, part)
+            and (getattr(times.stamps, part) == numbers[name]).mean() > 0.9
+        ):
+            found.add(name)
     known = np.where(times.stamps.isna(), np.nan, times.stamps.as_unit("ns").asi8.astype(float))
     for name, values in numbers.items():
         words = set(words_of(name))

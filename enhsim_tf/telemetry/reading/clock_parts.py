@@ -13,13 +13,13 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.times import parse_times
 from enhsim_tf.telemetry.reading.clock_values import are_whole
 from enhsim_tf.telemetry.reading.column_names import UNIT_OF, UNITS, without_ends, words_of
-from enhsim_tf.telemetry.reading.contents import Contents, first_cells
+from enhsim_tf.telemetry.reading.contents import Contents, different, first_cells
 
 _PARTS = {
     "year": "year yyyy yy yr jahr",
-    "month": "month mo mm monat",
+    "month": "month mnth mo mm monat",
     "day": "day dy dom dd tag",
-    "doy": "doy dayofyear jday ddd",
+    "day_of_year": "doy dayofyear jday ddd",
     "hour": "hour hr hh stunde",
     "hour of an interval": "hourending hourbeginning",
     "minute": "minute min mn",
@@ -31,7 +31,7 @@ _MOST = {"hour": 24, "minute": 60, "second": 60} | _FRACTIONS  # of a time of da
 _STATISTICS = set("max maximum mean avg average".split())  # beside which `min` is no minute
 _CLOSE = 0.02  # by which fractions of a second may make the steps of a clock less alike
 _FEW = 0.05  # share of the rows in which a part of a time may be out of range
-_ADDED = {"doy": "D", "hour": "h", "minute": "min", "second": "s", "ms": "ms"}
+_ADDED = {"day_of_year": "D", "hour": "h", "minute": "min", "second": "s", "ms": "ms"}
 _ADDED |= {"us": "us", "ns": "ns"}
 
 
@@ -50,7 +50,7 @@ def joined_clock(table: Contents, dates: list[str]) -> Clock | None:
     numbers, make together, or None.
     """
     frame = table.frame
-    hours = without_ends(table.of_kind("times of day"))
+    hours = different(frame, without_ends(table.of_kind("times of day")))
     if len(dates) != 1 or len(hours) > 1:
         return None
     cells = frame[dates[0]]
@@ -81,7 +81,7 @@ def _parts_beside(
     """Returns the columns of whole numbers by the parts of the time that they add to dates, or to
     dates and times of day.
     """
-    parts = {part: name for part, name in _parts_of(table.numbers).items() if part in _MOST}
+    parts = {part: name for part, name in parts_of(table.numbers).items() if part in _MOST}
     fractions = {part: name for part, name in parts.items() if part in _FRACTIONS}
     if hours and is_day:
         has_minutes = first_cells(table.frame[hours[0]]).str.fullmatch(r" *\d\d?:\d\d *").all()
@@ -116,15 +116,15 @@ def clock_of_parts(table: Contents) -> Clock | None:
     the time of day, or None.
     """
     numbers = table.numbers
-    parts = _parts_of(numbers)
-    if not {"doy", "month"} & set(parts) or "year" not in parts:
+    parts = parts_of(numbers)
+    if not {"day_of_year", "month"} & set(parts) or "year" not in parts:
         return None
     years = numbers[parts["year"]]
     if not are_whole(years[np.isfinite(years)], 1900, 2200):
         return None
     if "second" not in parts:
         parts = {part: name for part, name in parts.items() if part not in _FRACTIONS}
-    of_date = ("month", "day") if "doy" not in parts else ()
+    of_date = ("month", "day") if "day_of_year" not in parts else ()
     days = {part: numbers[parts[part]] if part in parts else 1.0 for part in of_date}
     days = pd.DataFrame({"year": years, "month": 1.0, "day": 1.0} | days)
     stamps = pd.to_datetime(days, errors="coerce").astype("datetime64[ns]")
@@ -195,7 +195,7 @@ def _makes_alike(cells: pd.Series, added: pd.Series) -> bool:
     return (is_wide or before == np.inf) and spread(both) <= before + _CLOSE
 
 
-def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
+def parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
     """Returns the columns that are named like parts of a date or a time of day, and may hold them,
     by these parts.
     """
@@ -204,7 +204,7 @@ def _parts_of(numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
     for name, word in plain.items():
         part = _PART_OF.get(word)
         # the second of `MM` and `mm`
-        if word == "mm" and {"month", "doy"} & set(found):
+        if word == "mm" and {"month", "day_of_year"} & set(found):
             part = "minute"
         if part is not None and not (word == "min" and _STATISTICS.intersection(plain.values())):
             found.setdefault(part, name)
@@ -236,7 +236,7 @@ def _added(numbers: Mapping[str, np.ndarray], parts: Mapping[str, str]) -> pd.Se
     spans = []
     for part, unit in _ADDED.items():
         if part in parts:
-            values = numbers[parts[part]] - (part == "doy")
+            values = numbers[parts[part]] - (part == "day_of_year")
             is_known = (values >= 0) & (values <= most.get(part, np.inf))  # others have no time
             spans.append(pd.Series(pd.to_timedelta(np.where(is_known, values, np.nan), unit=unit)))
     unit = "ns" if "ns" in parts else "us"

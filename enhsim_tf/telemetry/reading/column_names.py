@@ -62,6 +62,11 @@ def name_tells(name: str) -> tuple[int, str | None]:
     return (2, unit) if is_known and any(word in _TIMES for word in words) else (0, None)
 
 
+def mentions_time(name: str) -> bool:
+    """Whether a name has a word of time among others."""
+    return not _TIMES.isdisjoint(words_of(name))
+
+
 def tells_time_of(signal: str, name: str) -> bool:
     """Whether a name says no more than that of a signal and that it is a time, as `volts_time`
     beside `volts` and `time2` beside any.

@@ -90,8 +90,11 @@ def lay_out(
     if times is not None and not times.zone and options.timezone is None:
         refuse_other_zone(times, {name: numbers[name] for name in further & set(numbers)}, what)
     free_numbers = {name: values for name, values in numbers.items() if name not in roles}
+    has_names = "column 1" not in kinds
     counted = [
-        name for name, values in free_numbers.items() if _counts(name, values, bool(clock.columns))
+        name
+        for name, values in free_numbers.items()
+        if _counts(name if has_names else "", values, bool(clock.columns))
     ]
     # if the only column counts, it is the channel
     if len(counted) < sum(not roles.get(name) for name in numbers):

@@ -51,6 +51,11 @@ def first_cells(cells: pd.Series, most: int = LOOK) -> pd.Series:
     return cells.dropna().iloc[:most].astype("str")
 
 
+def different(frame: pd.DataFrame, names: list[str]) -> list[str]:
+    """Leaves out columns that hold the same as the first of them."""
+    return names[:1] + [name for name in names[1:] if not frame[name].equals(frame[names[0]])]
+
+
 def contents_of(
     table: Table, asked: Collection[str], time_format: str | None, what: str
 ) -> Contents:

@@ -109,13 +109,19 @@ def find_dialect(text: str, name: str, options: Cleaning, separator: str | None 
         raise ValueError("it is empty")
     marks = [mark for mark in separator or _SEPARATORS if any(mark in line for line in lines)]
     layouts = [_lay_out(mark, lines, options.no_header) for mark in marks]
-    found = [layout for layout in layouts if layout and len(layout.names) > 1]
+    found = [
+        layout
+        for layout in layouts
+        if layout and len(layout.names) > 1 and max(map(len, layout.head), default=2) > 1
+    ]
     if not found:
         by_blanks, single = (_lay_out(mark, lines, options.no_header) for mark in (BLANKS, _WHOLE))
         has_blanks = by_blanks is not None and len(by_blanks.names) > 1
         for layout in layouts:  # with too few names; decimal commas may seem to be separators
             if layout and not (layout.names or has_blanks and layout.separator == ","):
                 _refuse_header(layout, name)
+        if not has_blanks:
+            _refuse_below_text([*set(marks) - {","}, BLANKS], lines, name)
         found = [by_blanks if has_blanks else single]
     if found == [None]:
         raise ValueError("lines of different lengths")
@@ -136,6 +142,16 @@ def find_dialect(text: str, name: str, options: Cleaning, separator: str | None 
     return dataclasses.replace(
         best, names=[each or f"column {number}" for number, each in enumerate(best.names)]
     )
+
+
+def _refuse_below_text(marks: Sequence[str], lines: Sequence[str], name: str) -> None:
+    """Refuses columns of numbers below several lines of text, none of which names them."""
+    for mark in marks:
+        bare = _lay_out(mark, lines, no_header=True)
+        above = bare and len(list(filter(_is_content, bare.above)))
+        if above and above > 1 and 2 <= len(bare.names) == len(bare.head[0]):
+            if sum(bool(_SOLID.match(cell)) for cell in bare.head[0]) > 1:
+                _refuse_header(bare, name)
 
 
 def _refuse_header(found: Dialect, name: str) -> NoReturn:
@@ -231,9 +247,10 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
     top = next((number for number in range(begin, 0, -1) if rows[number - 1]), 0)
     top = top if top and len(rows[top - 1]) == width else begin
     block = top
+    fewest = width if no_header else 1
     while (
         block > 0
-        and 0 < len(rows[block - 1]) <= width
+        and fewest <= len(rows[block - 1]) <= width
         and (shares[block - 1] == 0 or len(rows) == 1)
     ):
         block -= 1

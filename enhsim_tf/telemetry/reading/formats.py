@@ -30,7 +30,20 @@ _OF_JSON = (
 )
 # texts of other forms by how they begin: what they are, and what to give instead
 _FOREIGN = {
-    rb"Linux \S+ \(": ("the text of sar", "the output of sadf -d, which is a table of the same"),
+    rb"Linux \S+ \(": (
+        "the text of sar, iostat or pidstat",
+        "of sar the output of sadf -d; of others their table alone, with a column of times",
+    ),
+    rb"\(\d+\.\d+\) \S+ +[0-9A-Fa-f]+#|date .*\r?\nbase |;\$FILEVERSION": (
+        "frames of a CAN bus",
+        "their signals, which cantools or asammdf decode with the DBC file of the bus",
+    ),
+    rb"(?:#.*\n)*\d\S*\s+\(+[-+]?\d": ("vectors in brackets", "the same numbers without brackets"),
+    rb"(?i)\s*<(?:\?xml|!doctype|!--|html|svg|table)[\s>]": (
+        "XML or HTML",
+        "the table that pandas.read_xml or pandas.read_html returns, as a DataFrame",
+    ),
+    rb"Program Version,EnergyPlus": ("records of EnergyPlus", "the CSV that ReadVarsESO writes"),
     rb"\d\d:\d\d:\d\d\.\d+ -> ": (
         "a log of a serial monitor",
         "the lines with a comma instead of ' -> ', only numbers behind it and names on top",
