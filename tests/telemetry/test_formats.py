@@ -325,6 +325,15 @@ def test_lists_inside_of_one_json_record_are_a_table(tmp_path):
         np.testing.assert_array_equal(telemetry.values, expected)
 
 
+def test_the_series_of_a_chart_are_columns_beside_its_times(tmp_path):
+    series = [{"name": name, "data": FRAME[name].tolist()} for name in ("volts", "amps")]
+    record = {"time": FRAME["time"].astype(str).tolist(), "series": series}
+    (tmp_path / "a.json").write_text(json.dumps(record))
+    (telemetry,) = read_telemetry(tmp_path / "a.json")
+    assert telemetry.columns == ("series.volts", "series.amps")
+    np.testing.assert_allclose(telemetry.values, FRAME[["volts", "amps"]], rtol=1e-6)
+
+
 def test_one_of_several_lists_of_records_is_chosen_by_name(tmp_path, refused):
     records = FRAME.astype({"time": str}).to_dict("records")
     (tmp_path / "a.json").write_text(json.dumps({"one": records, "two": {"x": records[::-1]}}))

@@ -148,6 +148,8 @@ def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str
         inside = f"{group}.{key}".strip(".")
         if isinstance(value, dict):
             lists |= _lists_of(value, inside)
+        elif isinstance(value, list) and (named := _named_lists(value)):
+            lists |= {(group, f"{key}.{name}"): column for name, column in named.items()}
         elif isinstance(value, list) and value:
             is_records = isinstance(value[0], dict)
             frame = pd.json_normalize(value) if is_records else pd.DataFrame(value)
@@ -161,6 +163,23 @@ def _lists_of(record: Mapping[str, Any], group: str = "") -> dict[tuple[str, str
                 names = (group, key if frame.shape[1] == 1 else f"{key}.{name}")
                 lists[(inside, name) if is_records else names] = column.to_numpy()
     return lists
+
+
+def _named_lists(records: Sequence[Any]) -> dict[str, np.ndarray]:
+    """Returns the lists of records of a name and one list each, as charts hold their series, by
+    these names; none of other records.
+    """
+    named: dict[str, np.ndarray] = {}
+    for record in records:
+        if not isinstance(record, dict):
+            return {}
+        lists = [value for value in record.values() if isinstance(value, list)]
+        name = record.get("name", record.get("label"))
+        is_series = len(lists) == 1 and not any(isinstance(x, list | dict) for x in lists[0])
+        if not is_series or not isinstance(name, str) or name in named:
+            return {}
+        named[name] = pd.Series(lists[0]).to_numpy()
+    return named
 
 
 def read_excel(content: bytes, name: str, options: Cleaning) -> Table:
