@@ -172,7 +172,9 @@ def _refuse_without_numbers(
         _is_state(table.frame[name]) for name in layout.words
     )
     pairs = "only numbers below a line of names, with commas between them"
-    other = "one number in each cell; a workbook needs the saved values of its formulas"
+    other = "one number in each cell"
+    if ".xls" in what:
+        other += ", with the saved values of formulas"
     raise InputError(
         f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
         [{"states": True} | ({"series_column": NO_TIME} if has_keys else {})]
