@@ -73,20 +73,8 @@ READ = {
         table("YYYYMMDD,HH,Minute,v", *(stamps(form) for form in ("%Y%m%d", "%H", "%M")), VALUES),
         START,
     ),
-    "a line of words above the names": (
-        table("Time;v", SECONDS, VALUES, separator=";", above="Device;ABC\n"),
-        ZERO,
-    ),
     "the beginning and the end of samples without length, each as a date and a time": (
         table("day,clock,day2,clock2,v", *(stamps(form) for form in ("%F", "%T") * 2), VALUES),
-        START,
-    ),
-    "bars at the end of the lines above the data": (
-        table("DATE TIME v |", MINUTES, VALUES, separator=" ", above="station |\nlength 1 |\n"),
-        START,
-    ),
-    "parts of the time beside it": (
-        table("time,year,DOY,v", MINUTES, stamps("%Y"), stamps("%j"), VALUES),
         START,
     ),
     "a line of formats": (
@@ -1139,14 +1127,12 @@ def test_quality_flags_and_counts_beside_a_clock_are_named_and_left_out():
     report = check(
         only(
             read_source(
-                pd.DataFrame(
-                    {"time": TIMES, "v": VALUES, "v_quality": 192, "QN_9": 3, "number": range(N)}
-                )
+                pd.DataFrame({"time": TIMES, "v": VALUES, "v_quality": 192, "number": range(N)})
             )
         )
     )
     assert (
-        "v_quality, QN_9" in report.find("quality flags").text
+        "v_quality" in report.find("quality flags").text
         and "number" in report.find("row numbers").text
     )
 
@@ -1516,6 +1502,19 @@ def test_the_size_of_a_number_says_the_unit_of_a_time_since_1970(size, unit):
 def test_rows_that_were_chosen_from_a_frame_are_no_channel():
     frame = pd.DataFrame({"time": TIMES, "v": VALUES})
     assert list(read_source(frame[frame["v"] > 16])) == ["v"]
+
+
+def test_parts_of_the_time_beside_it_are_no_channels():
+    times = pd.date_range(START, periods=N, freq="h")
+    frame = {"time": times, "DOY": times.day_of_year, "Hour": times.hour, "mm": VALUES, "v": VALUES}
+    assert list(read_source(pd.DataFrame(frame))) == ["mm", "v"]
+
+
+def test_hexadecimal_numbers_leave_other_columns_without_names_what_they_are(tmp_path):
+    text = table("", SECONDS, [f"DD{k:04X}" for k in range(N)], VALUES)
+    (tmp_path / "a.csv").write_text(text.lstrip())
+    options = Cleaning(no_header=True)
+    assert list(read_source(tmp_path / "a.csv", time="column 0", options=options)) == ["column 2"]
 
 
 def test_times_since_1970_and_since_the_start_are_one_clock():

@@ -67,13 +67,10 @@ _ZONE = re.compile(r"\b(?:CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylig
 _TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(?!\d).*"
 _WITH_YEAR = re.compile(r"\d:\d\d.*\b20\d\d|\b20\d\d.*\d:\d\d")
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
-# formats of times of day, which begin with 1900, by their digits as 1
-_FORMS_OF_DAY = {
-    "1:1": ("%H:%M", "%M:%S"),
-    "1:1:1": ("%H:%M:%S",),
-    "1:1:1.1": ("%H:%M:%S.%f",),
-}
-_ZONE_COLUMN = re.compile(r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?offset|tz_cd", re.IGNORECASE)
+_FORMS_OF_DAY = ("%H:%M", "%M:%S", "%H:%M:%S", "%H:%M:%S.%f")  # whose dates are 1900-01-01
+_ZONE_COLUMN = re.compile(
+    r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?(?:offset|ofst)|tz_cd", re.IGNORECASE
+)
 
 
 def _seconds_of(spans: pd.Series) -> np.ndarray:
@@ -121,9 +118,10 @@ def find_clock(table: Contents) -> Clock:
         return clock_of_fractions(numbers, fractions[0])
     if may_be:
         clocks = _clearest(may_be, tells)
-        if compact and clocks != compact[:1]:
+        is_plain = not is_epoch(numbers[clocks[0]]) and name_tells(clocks[0])[1] is None
+        if compact and clocks != compact[:1] and is_plain:
             _refuse_apart(table, compact[0], clocks[0])
-        if dates and not is_epoch(numbers[clocks[0]]) and name_tells(clocks[0])[1] is None:
+        if dates and is_plain:
             _refuse_apart(table, dates[0], clocks[0], [{"time": clocks[0]}])
         return _one_of(table, clocks)
     return _one_of(table, dates) if dates else _unclear_clock(table, tells)
@@ -146,13 +144,18 @@ def _unclear_clock(table: Contents, tells: Mapping[str, int]) -> Clock:
     """
     for name, kind in table.kinds.items():
         if kind == "times of day":
-            cell = table.frame[name].dropna().iloc[0]
-            forms = (
-                _FORMS_OF_DAY.get(re.sub(r"\d+", "1", cell), ()) if isinstance(cell, str) else ()
-            )
+            cells = table.frame[name].dropna()
+            text = cells.astype("str")
+            options = [
+                {"time_format": form}
+                for form in _FORMS_OF_DAY
+                if isinstance(cells.iloc[0], str)
+                and pd.to_datetime(text, format=form, errors="coerce").is_monotonic_increasing
+            ]
             raise InputError(
-                f"Expected times with a date. Received: {str(cell)!r} in {name!r} of {table.what}.",
-                [*({"time_format": form} for form in forms), _COUNT],
+                f"Expected times with a date. Received: {text.iloc[0]!r} in {name!r} of "
+                f"{table.what}.",
+                [*options, _COUNT],
                 "a column of dates",
             )
         if tells[name] == 2 and kind == "words":
@@ -227,8 +230,6 @@ def _refuse_unknown(table: Contents) -> None:
         name
         for name, values in numbers.items()
         if is_regular(values)
-        or mentions_time(name)
-        and is_increasing(values)
         or is_unnamed(name)
         and "column 1" not in kinds  # no column has a name
         and is_increasing(values)
@@ -244,7 +245,11 @@ def _refuse_unknown(table: Contents) -> None:
     ramp = next(iter(ramps), next(in_order, None))
     if ramp is not None and len(table.of_kind("numbers")) > 1:
         step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
-        named = [name for name in ramps if name != ramp and mentions_time(name)]
+        named = [
+            name
+            for name, values in numbers.items()
+            if name != ramp and mentions_time(name) and is_increasing(values)
+        ]
         clocks = [ramp, *(named or ramps[1:])[:1]]
         raise InputError(
             f"Expected to know the clock. Received: {ramp!r} of {table.what}, which increases in "
@@ -319,8 +324,10 @@ def offset_of(
         for name in frame
         if _ZONE_COLUMN.search(name) or name.casefold() == "tz" and is_text(frame[name])
     ]
-    said = set(_PLACE.findall(f"{named} {above}"))
+    cells = [str(cell).strip() for name in beside for cell in frame[name].dropna().unique()[:1]]
+    said = set(_PLACE.findall(" ".join((named, above, *cells))))
     places = sorted(said & zoneinfo.available_timezones()) if said else []
+    offsets = [cell for cell in cells if re.fullmatch(r"[+-]\d\d:\d\d", cell)]
     head = frame.iloc[:LOOK]
     texts = [str(cell) for name in frame if is_text(head[name]) for cell in head[name].dropna()[:1]]
     beside += [text for text in texts if _WITH_YEAR.search(text) and _ZONE.search(text)]
@@ -330,7 +337,7 @@ def offset_of(
             "Expected times that state their zone. Received: "
             f"{', '.join(dict.fromkeys([named, *beside, *places]))} in {what}, where a zone is "
             "named that is not read.",
-            [{"timezone": each} for each in dict.fromkeys((*places, "UTC"))],
+            [{"timezone": each} for each in dict.fromkeys((*places, *offsets, "UTC"))],
             "the zone of the clock, as Europe/Berlin",
         )
     return None
@@ -386,7 +393,7 @@ def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:
         else is_nearly(numbers[first], numbers[name])
         # times since 1970 and since the start
         or is_epoch(numbers[first]) != is_epoch(numbers[name])
-        and shows_time(numbers[first], numbers[name])
+        and is_nearly(*(numbers[clock] - np.nanmin(numbers[clock]) for clock in (first, name)))
         for name in others
     ):
         raise InputError(
@@ -399,24 +406,21 @@ def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:
 
 def _signals_of(kinds: Mapping[str, str], clocks: Collection[str]) -> dict[str, list[str]]:
     """Returns the columns of numbers behind each of several clocks, up to the next one; nothing
-    unless each clock has a signal, and each signal a clock.
+    unless the first column is a clock and each clock has a signal. Beside clocks of one name, words
+    are no columns, and clocks of words alone are none.
     """
+    is_repeated = len({name.rstrip("0123456789") for name in clocks}) == 1
     groups: dict[str, list[str]] = {}
     for name, kind in kinds.items():
         if name in clocks:
             groups[name] = []
-        elif groups and kind in ("numbers", "words"):
+        elif groups and kind == "numbers":
             groups[list(groups)[-1]].append(name)
-        elif kind == "numbers":
+        elif kind == "numbers" or not groups and not is_repeated:
             return {}
-    if not all(groups.values()):
-        return {}
-    of_numbers = {
-        clock: [name for name in names if kinds[name] == "numbers"]
-        for clock, names in groups.items()
-    }
-    found = {clock: names for clock, names in of_numbers.items() if names}
-    return found if len(found) > 1 else {}
+    if is_repeated:
+        groups = {clock: signals for clock, signals in groups.items() if signals}
+    return groups if len(groups) > 1 and all(groups.values()) else {}
 
 
 def _is_named_clock(name: str, values: np.ndarray) -> bool:
@@ -439,10 +443,8 @@ def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[st
             ),
         )
     for part, name in parts_of(numbers).items():
-        if (
-            hasattr(times.stamps, part)
-            and (getattr(times.stamps, part) == numbers[name]).mean() > 0.9
-        ):
+        values = getattr(times.stamps, part, None)
+        if values is not None and values.nunique() > 1 and (values == numbers[name]).mean() > 0.9:
             found.add(name)
     known = np.where(times.stamps.isna(), np.nan, times.stamps.as_unit("ns").asi8.astype(float))
     for name, values in numbers.items():

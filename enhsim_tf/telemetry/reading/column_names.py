@@ -4,7 +4,7 @@ import re
 
 _TIMES = set(
     "time times timestamp timestamps datetime date dates epoch elapsed simtime tout unix unixtime "
-    "utc utcg posix ts clock mjd jd datenum uptime yyyymmdd "
+    "utc utcg posix ts clock mjd jd datenum uptime yyyymmdd hhmm hhmmss "
     "seconds secs millis milliseconds microseconds nanoseconds minutes hours days zeit zeitstempel "
     "zeitpunkt datum uhrzeit sekunden "
     "temps heure horodatage tiempo fecha hora tempo tijd".split()

@@ -32,7 +32,7 @@ _LABELS = set(
         "changepoint groundtruth"
     ).split()
 )
-_FLAGS = set("quality qc qa qn flag flags valid validity mask".split())
+_FLAGS = set("quality qc qa flag flags valid validity mask".split())
 _ROWS = set(
     (
         "index idx row rows rownumber record recordnumber id no nr sample samples number entry "

@@ -71,7 +71,7 @@ def contents_of(
             if name not in asked and _fits(frame[name], str(time_format))
         }
     # of a family such as D1, D2, ... of which one holds hexadecimal numbers, all do
-    families = {name: name.rstrip("0123456789") for name in kinds}
+    families = {name: name.rstrip("0123456789").removesuffix("column ") or name for name in kinds}
     hexadecimal = {
         family
         for name, family in families.items()

@@ -13,7 +13,6 @@ from typing import NoReturn
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding
-from enhsim_tf.telemetry.reading.column_names import UNIT_OF, name_tells
 
 BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
 _WHOLE = ""  # the separator of files of one column
@@ -109,11 +108,7 @@ def find_dialect(text: str, name: str, options: Cleaning, separator: str | None 
         raise ValueError("it is empty")
     marks = [mark for mark in separator or _SEPARATORS if any(mark in line for line in lines)]
     layouts = [_lay_out(mark, lines, options.no_header) for mark in marks]
-    found = [
-        layout
-        for layout in layouts
-        if layout and len(layout.names) > 1 and max(map(len, layout.head), default=2) > 1
-    ]
+    found = [layout for layout in layouts if layout and len(layout.names) > 1]
     if not found:
         by_blanks, single = (_lay_out(mark, lines, options.no_header) for mark in (BLANKS, _WHOLE))
         has_blanks = by_blanks is not None and len(by_blanks.names) > 1
@@ -321,11 +316,8 @@ def _names_of(
     """Returns the names and the units in a block of lines above the first row of data; fewer names
     than columns if a sample of the data has values in the others.
     """
-    # the line of the most different names, of several the first that names a clock, or the first
-    header = max(
-        range(len(block)),
-        key=lambda number: (len({*block[number]} - {""}), any(map(_names_clock, block[number]))),
-    )
+    # the line of the most different names, of several the first
+    header = max(range(len(block)), key=lambda number: len({*block[number]} - {""}))
     given = block[header]
     if mark == BLANKS and below and len(given) == width - 1:
         # a date and a time of day below one name
@@ -341,10 +333,6 @@ def _names_of(
     for row in (*block[:header], *block[header + 1 :]):
         names = [name or other for name, other in itertools.zip_longest(names, row, fillvalue="")]
     return names, block[header + 1] if header + 1 < len(block) else ()
-
-
-def _names_clock(cell: str) -> bool:
-    return cell.casefold() not in UNIT_OF and name_tells(cell)[0] == 2
 
 
 def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:

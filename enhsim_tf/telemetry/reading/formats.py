@@ -34,12 +34,15 @@ _FOREIGN = {
         "the text of sar, iostat or pidstat",
         "of sar the output of sadf -d; of others their table alone, with a column of times",
     ),
-    rb"\(\d+\.\d+\) \S+ +[0-9A-Fa-f]+#|date .*\r?\nbase |;\$FILEVERSION": (
+    rb"\(\d+\.\d+\) \S+ +[\dA-Fa-f]+#|date \w{3} .*\r?\nbase (?:hex|dec)|;\$FILEVERSION": (
         "frames of a CAN bus",
         "their signals, which cantools or asammdf decode with the DBC file of the bus",
     ),
-    rb"(?:#.*\n)*\d\S*\s+\(+[-+]?\d": ("vectors in brackets", "the same numbers without brackets"),
-    rb"(?i)\s*<(?:\?xml|!doctype|!--|html|svg|table)[\s>]": (
+    rb"(?:#.*\n)*[-+.\de]+[ \t]+\(+[-+.\de]+ [-+.\de() \t]*\)\s*\n": (
+        "vectors in brackets",
+        "the same numbers without brackets",
+    ),
+    rb"(?i)\s*<(?:\?xml|!doctype|html|svg)[\s>]": (
         "XML or HTML",
         "the table that pandas.read_xml or pandas.read_html returns, as a DataFrame",
     ),
@@ -175,8 +178,11 @@ def _named_lists(records: Sequence[Any]) -> dict[str, np.ndarray]:
             return {}
         lists = [value for value in record.values() if isinstance(value, list)]
         name = record.get("name", record.get("label"))
-        is_series = len(lists) == 1 and not any(isinstance(x, list | dict) for x in lists[0])
-        if not is_series or not isinstance(name, str) or name in named:
+        if len(lists) != 1 or not isinstance(name, str) or name in named:
+            return {}
+        # a list that is shorter than that of the records is one of tags or coordinates
+        is_long = len(lists[0]) > max(2, len(records))
+        if not is_long or any(isinstance(value, list | dict) for value in lists[0]):
             return {}
         named[name] = pd.Series(lists[0]).to_numpy()
     return named
