@@ -68,6 +68,7 @@ _TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(
 _WITH_YEAR = re.compile(r"\d:\d\d.*\b20\d\d|\b20\d\d.*\d:\d\d")
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
 _FORMS_OF_DAY = ("%H:%M", "%M:%S", "%H:%M:%S", "%H:%M:%S.%f")  # whose dates are 1900-01-01
+_EACH_CLOCK = "each clock with its signals as a file"
 _ZONE_COLUMN = re.compile(
     r"time[ _]?zone|zeitzone|(?:tz|utc|gmt)[ _]?(?:offset|ofst)|tz_cd", re.IGNORECASE
 )
@@ -241,6 +242,7 @@ def _refuse_unknown(table: Contents) -> None:
             f"Expected to know the clock. Received: {', '.join(list(groups)[:4])} of {table.what}, "
             "which increase in equal steps, each with signals of its own.",
             [*({"time": name, "columns": group} for name, group in groups.items()), _COUNT],
+            _EACH_CLOCK,
         )
     ramp = next(iter(ramps), next(in_order, None))
     if ramp is not None and len(table.of_kind("numbers")) > 1:
@@ -400,7 +402,7 @@ def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:
             f"Expected one clock. Received: {len(groups)} in {table.what}, each with signals of "
             f"its own ({', '.join(list(groups)[:4])}).",
             [{"time": name, "columns": group} for name, group in groups.items()],
-            "each clock with its signals as a file",
+            _EACH_CLOCK,
         )
 
 
