@@ -100,9 +100,10 @@ def read_table_channels(
     for kind, text in _SAID.items():
         used = (*keys, *(layout.words if options.states else ()))
         if names := [name for name in layout.left_out.get(kind, ()) if name not in used]:
+            text += f": {', '.join(names[:8])}"
             if any(name in layout.words and _is_state(table.frame[name]) for name in names):
                 text += " (--states reads states)"
-            findings.append(Finding(kind, len(names), f"{text}: {', '.join(names[:8])}"))
+            findings.append(Finding(kind, len(names), text))
     if keys:
         chosen, noted = _several_series(table, keys, layout, columns is None, what)
     else:
