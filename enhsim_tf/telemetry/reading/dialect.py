@@ -116,7 +116,7 @@ def find_dialect(text: str, name: str, options: Cleaning, separator: str | None 
             if layout and not (layout.names or has_blanks and layout.separator == ","):
                 _refuse_header(layout, name)
         if not has_blanks:
-            _refuse_below_text([*set(marks) - {","}, BLANKS], lines, name)
+            _refuse_below_text(lines, name)
         found = [by_blanks if has_blanks else single]
     if found == [None]:
         raise ValueError("lines of different lengths")
@@ -139,14 +139,16 @@ def find_dialect(text: str, name: str, options: Cleaning, separator: str | None 
     )
 
 
-def _refuse_below_text(marks: Sequence[str], lines: Sequence[str], name: str) -> None:
+def _refuse_below_text(lines: Sequence[str], name: str) -> None:
     """Refuses columns of numbers below several lines of text, none of which names them."""
-    for mark in marks:
+    for mark in (*_SEPARATORS.strip(","), BLANKS):
         bare = _lay_out(mark, lines, no_header=True)
-        above = bare and len(list(filter(_is_content, bare.above)))
-        if above and above > 1 and 2 <= len(bare.names) == len(bare.head[0]):
-            if sum(bool(_SOLID.match(cell)) for cell in bare.head[0]) > 1:
-                _refuse_header(bare, name)
+        if bare is None:
+            continue
+        num_above = sum(map(_is_content, bare.above))
+        num_solid = sum(bool(_SOLID.match(cell)) for cell in bare.head[0])
+        if num_above > 1 and num_solid > 1 and len(bare.names) == len(bare.head[0]):
+            _refuse_header(bare, name)
 
 
 def _refuse_header(found: Dialect, name: str) -> NoReturn:

@@ -38,7 +38,7 @@ _FOREIGN = {
         "frames of a CAN bus",
         "their signals, which cantools or asammdf decode with the DBC file of the bus",
     ),
-    rb"(?:#.*\n)*[-+.\de]+[ \t]+\(+[-+.\de]+ [-+.\de() \t]*\)\s*\n": (
+    rb"(?:#.*\n)*[-+.\deE]+[ \t]+\(+[-+.\deE]+ [-+.\deE() \t]*\)\s*\n": (
         "vectors in brackets",
         "the same numbers without brackets",
     ),
