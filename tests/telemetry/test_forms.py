@@ -490,6 +490,12 @@ ASKED = {
         {"options": Cleaning(time_format="%Y%m%d%H")},
         3_600,
     ),
+    "a date and a time of day with nothing between them": (
+        table("time;v", stamps("%d.%m.%y%H:%M:%S"), VALUES, separator=";"),
+        "--time-format",
+        {"options": Cleaning(time_format="%d.%m.%y%H:%M:%S")},
+        60,
+    ),
     "times of day alone": (
         table("clock,v", stamps("%H:%M:%S"), VALUES),
         "--time-format %H:%M:%S",

@@ -423,7 +423,8 @@ def date_forms(text: pd.Series) -> list[str]:
     for cell in head.iloc[:3]:  # the first cells may be damaged
         if found := _DAY_OF_YEAR.fullmatch(cell):
             return [f"%Y{found['mark']}%j{_end(found)}"] if found["mark"] or found["time"] else []
-        if found := _DAY_MONTH.fullmatch(cell):
+        # 25.01.1706:12:01 is no year 1706
+        if (found := _DAY_MONTH.fullmatch(cell)) and (found["letters"] or found["gap"] != ":"):
             mark = found["mark"]
             year = "%Y" if found["century"] else "%y"
             orders = [f"%d{mark}%b{mark}{year}"] if found["letters"] else _orders(text, mark, year)
