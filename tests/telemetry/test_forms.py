@@ -1516,6 +1516,15 @@ def test_parts_of_the_time_beside_it_are_no_channels():
     assert list(read_source(pd.DataFrame(frame))) == ["mm", "v"]
 
 
+def test_a_clock_with_steps_of_any_length_is_asked_for_where_no_column_has_a_name(
+    tmp_path, refused
+):
+    times = (SECONDS + 20 * np.sin(np.arange(N))).round(2)
+    (tmp_path / "a.csv").write_text(table("", times, VALUES).lstrip())
+    with refused("--time 'column 0'"):
+        read_source(tmp_path / "a.csv", options=Cleaning(no_header=True))
+
+
 def test_hexadecimal_numbers_leave_other_columns_without_names_what_they_are(tmp_path):
     text = table("", SECONDS, [f"DD{k:04X}" for k in range(N)], VALUES)
     (tmp_path / "a.csv").write_text(text.lstrip())

@@ -232,7 +232,6 @@ def _refuse_unknown(table: Contents) -> None:
         for name, values in numbers.items()
         if is_regular(values)
         or is_unnamed(name)
-        and "column 1" not in kinds  # no column has a name
         and is_increasing(values)
         and np.nanmax(values % 1) > 0
     ]
