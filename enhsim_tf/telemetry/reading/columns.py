@@ -94,7 +94,7 @@ def lay_out(
     counted = [
         name
         for name, values in free_numbers.items()
-        if _counts(name if has_names else "", values, bool(clock.columns))
+        if _counts(values, bool(clock.columns), has_names and is_unnamed(name))
     ]
     # if the only column counts, it is the channel
     if len(counted) < sum(not roles.get(name) for name in numbers):
@@ -199,13 +199,13 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
     return len(known) == 1 or bool(len(known)) and bool(np.mean(np.diff(known) == 1) >= 0.9)
 
 
-def _counts(name: str, values: np.ndarray, has_clock: bool) -> bool:
+def _counts(values: np.ndarray, has_clock: bool, is_index: bool) -> bool:
     """Whether a column numbers the rows by its values: it counts from 0 or 1 beside a clock, or it
-    has no name and holds different whole numbers that are no times.
+    alone has no name (`is_index`) and holds different whole numbers that are no times.
     """
     if has_clock and len(values) > 2 and values[0] in (0, 1) and (np.diff(values) == 1).all():
         return True
-    is_whole = is_unnamed(name) and not is_epoch(values) and not (values % 1).any()
+    is_whole = is_index and not is_epoch(values) and not (values % 1).any()
     return is_whole and len(np.unique(values)) == len(values)
 
 
