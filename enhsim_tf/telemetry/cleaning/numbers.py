@@ -180,7 +180,7 @@ def _options(cells: pd.Series, decimal: str | None) -> list[dict[str, Any]]:
     words = list(dict.fromkeys(str(cell).strip() for cell in cells))
     if re.fullmatch(f"{_COMMA_THOUSANDS}|{_COMMA}", words[0]):
         return [sign for sign in SIGNS if sign["decimal"] != decimal]
-    is_short = len(words) <= 3 and all(0 < len(word) <= 20 and "," not in word for word in words)
+    is_short = len(words) <= 3 and all("," not in word for word in words)
     return [{"drop_bad": True}, *([{"missing_values": words}] if is_short else [])]
 
 

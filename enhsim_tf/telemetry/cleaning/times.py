@@ -317,7 +317,6 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
         return
     low = values.min()
     high = values.max()
-    is_whole = (values % 1 == 0).all()
     step = float(np.median(np.abs(np.diff(values))))
     found: dict[str, Sequence[str]] = {}  # the formats that a meaning has
     if 1900 <= low and high < 2100:
@@ -325,15 +324,13 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
     has_hours = 1e4 <= high or np.ptp(np.diff(values)) > 0  # 50 after 0, and 100 after 50, are none
     if has_hours and low // 100 < high // 100 and may_be_time_of_day(values):
         found["times of day"] = ()
-    if is_whole and 0 <= low < 1.2e9 and step >= 1_000 and step % 60 > 0:
+    if 0 <= low < 1.2e9 and step >= 1_000 and step % 60 > 0:
         found["ms or us"] = ("ms", "us")
     if form := compact_form(values):
         found["dates"] = (form,)
     tenths = step * 864_000
     is_odd = (
-        abs(step * 1000 - round(step * 1000)) > 1e-6
-        and round(tenths) > 0
-        and abs(tenths - round(tenths)) < 0.01 * tenths
+        abs(step * 1000 - round(step * 1000)) > 1e-6 and abs(tenths - round(tenths)) < 0.01 * tenths
     )
     if (is_odd or is_date) and any(first <= low and high < last for first, last in _DAY_NUMBERS):
         since = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
@@ -416,13 +413,12 @@ def date_forms(text: pd.Series) -> list[str]:
     None: the text is no dates. Two: day and month cannot be told apart.
     """
     head = _plain(text.iloc[:LOOK])
-    is_number = head.str.fullmatch(r"\d{1,7}").all()
     dates = pd.to_datetime(head, format=_ISO, utc=True, errors="coerce")
-    if not is_number and dates.notna().mean() > 0.5:
+    if dates.notna().mean() > 0.5:
         return [_ISO]
     for cell in head.iloc[:3]:  # the first cells may be damaged
         if found := _DAY_OF_YEAR.fullmatch(cell):
-            return [f"%Y{found['mark']}%j{_end(found)}"] if found["mark"] or found["time"] else []
+            return [f"%Y{found['mark']}%j{_end(found)}"]
         # 25.01.1706:12:01 is no year 1706
         if (found := _DAY_MONTH.fullmatch(cell)) and (found["letters"] or found["gap"] != ":"):
             mark = found["mark"]
@@ -629,6 +625,6 @@ def jumps_back(times: np.ndarray) -> list[int]:
         inside = (place > 0) & (place < len(before))
         # a gap that is filled late was not shown before
         num_twice = (before[place[inside]] - before[place[inside] - 1] <= longest).sum()
-        if num_twice > 10 and len(run) > 10 and (np.diff(run) >= 0).mean() > 0.9:
+        if num_twice > 10 and (np.diff(run) >= 0).mean() > 0.9:
             again.append(int(jump))
     return again if 2 * len(again) >= len(jumps) else []

@@ -112,7 +112,7 @@ def find_clock(table: Contents) -> Clock:
         if name not in sum(fractions, ()) and _may_be_clock(tells[name], values)
     }
     spans = [name for name in table.of_kind("spans") if may_count(_seconds_of(frame[name]))]
-    if spans and not fractions and all(tells[name] < 2 for name in may_be):
+    if spans and all(tells[name] < 2 for name in may_be):
         span = max(spans, key=lambda name: tells[name])
         return Clock((span,), frame[span])
     if fractions and not may_be:
@@ -182,7 +182,7 @@ def _refuse_apart_times(table: Contents, day: str) -> None:
             values = table.numbers[name][np.isfinite(table.numbers[name])]
             is_apart = name_tells(name)[1] is None and may_be_time_of_day(values)
             is_finer = (np.diff(values) > 0).all() and days.nunique() > 1
-            if not is_apart and is_finer:
+            if is_finer:
                 _one_of(table, [day, name])
         else:
             cells = first_cells(table.frame[name])
@@ -204,9 +204,7 @@ def _refuse_apart(
 
 
 def _may_be_clock(tells: int, values: np.ndarray) -> bool:
-    return tells > 0 and (
-        is_increasing(values) or tells == 2 and (is_epoch(values) or is_regular(values[::-1]))
-    )
+    return tells > 0 and (is_increasing(values) or is_epoch(values) or is_regular(values[::-1]))
 
 
 def _one_of(table: Contents, names: list[str]) -> Clock:
