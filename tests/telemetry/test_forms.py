@@ -24,6 +24,7 @@ VALUES = (20 + 5 * np.sin(np.arange(N) / 5)).round(2)
 START = pd.Timestamp("2024-03-01T00:00:00Z")
 TIMES = pd.date_range(START, periods=N, freq="min")
 SECONDS = 60 * np.arange(N)
+DAYS = TIMES + pd.Timedelta("23h30min")  # over midnight
 
 
 def table(header, *columns, separator=",", above="", below=""):
@@ -64,6 +65,23 @@ READ = {
     "hundreds of blank lines": (
         table("time,v", UTC, VALUES).replace("v\n", "v\n" + "\n" * 400, 1),
         START,
+    ),
+    "dates and times of day as numbers": (
+        table("Date,Time,v", DAYS.strftime("%d.%m.%Y"), DAYS.strftime("%-H%M"), VALUES),
+        DAYS[0],
+    ),
+    "compact dates and times of day with seconds": (
+        table("Date,b,v", *(DAYS.strftime(form) for form in ("%Y%m%d", "%-H%M%S")), VALUES),
+        DAYS[0],
+    ),
+    "the day of the year, and 2400 at its end": (
+        table(
+            "Year,DOY,b,v",
+            *((DAYS - pd.Timedelta("1min")).strftime(form) for form in ("%Y", "%j")),
+            [f"{time:%-H%M}".replace("000", "2400") for time in DAYS],
+            VALUES,
+        ),
+        DAYS[0],
     ),
     "a compact date, hours and minutes": (
         table("Date,Hour,Minute,v", *(stamps(form) for form in ("%Y%m%d", "%H", "%M")), VALUES),
@@ -698,6 +716,15 @@ REFUSED = {
             "date,time,v", stamps("%Y-%m-%d"), (TIMES + pd.Timedelta("9h")).strftime("%H%M"), VALUES
         ),
         "one column, as 2024",
+    ),
+    "numbers of places that begin again each day": (
+        table(
+            "date,place,v",
+            pd.date_range(START, periods=20).date.repeat(3),
+            [101, 102, 103] * 20,
+            VALUES,
+        ),
+        "--series-column place",
     ),
     "a clock behind each signal": (
         table("v,v_time,w,w_time", VALUES, SECONDS, VALUES, 2 * SECONDS),

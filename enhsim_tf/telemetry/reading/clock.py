@@ -31,6 +31,7 @@ from enhsim_tf.telemetry.reading.clock_parts import (
     joined_clock,
     parts_of,
     seconds_and_fractions,
+    with_times_of_day,
 )
 from enhsim_tf.telemetry.reading.clock_values import (
     FEWEST,
@@ -86,6 +87,7 @@ def find_clock(table: Contents) -> Clock:
     The table is without columns that are told otherwise, and its numbers without those of columns
     that are asked for as channels.
     """
+    table = with_times_of_day(table)
     frame = table.frame
     numbers = table.numbers
     tells = {name: name_tells(name)[0] for name in table.kinds}

@@ -2,6 +2,7 @@
 and hours, seconds and their fractions.
 """
 
+import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -10,9 +11,20 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import parse_times
+from enhsim_tf.telemetry.cleaning.times import (
+    LOOK,
+    compact_form,
+    may_be_time_of_day,
+    parse_times,
+)
 from enhsim_tf.telemetry.reading.clock_values import are_whole
-from enhsim_tf.telemetry.reading.column_names import UNIT_OF, UNITS, without_ends, words_of
+from enhsim_tf.telemetry.reading.column_names import (
+    UNIT_OF,
+    UNITS,
+    name_tells,
+    without_ends,
+    words_of,
+)
 from enhsim_tf.telemetry.reading.contents import Contents, different, first_cells
 
 _PARTS = {
@@ -43,6 +55,48 @@ class Clock(NamedTuple):
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
     added: pd.Series | None = None  # time spans
+
+
+def with_times_of_day(table: Contents) -> Contents:
+    """Returns a table in which numbers such as 1430 and 143000 are times of day in text: those
+    beside days that are named `HHMM`, or that go up within each day and begin again with the next.
+    """
+    frame = table.frame.copy(deep=False)
+    kinds = dict(table.kinds)
+    numbers = dict(table.numbers)
+    compact = [name for name, values in numbers.items() if compact_form(values[:LOOK]) == "%Y%m%d"]
+    of_day = (clock_of_parts(table) or Clock()).columns
+    days = frame[[*table.of_kind("dates"), *compact, *of_day]]
+    for name, values in table.numbers.items():
+        if name in days or not _are_times_of_day(values[:LOOK]) or not _are_times_of_day(values):
+            continue
+        form = re.search("hhmm(?:ss)?", name.casefold())
+        digits = 6 if values.max() > 2_400 or form and form[0] == "hhmmss" else 4
+        is_new = days.ne(days.shift()).any(axis=1).to_numpy()[1:]
+        is_named = name_tells(name) == (2, None)
+        if len(days.columns) and (form or _begin_daily(values, digits, is_new, is_named)):
+            text = pd.Series(values.astype(int).astype(str)).str.zfill(digits)
+            frame[name] = text.str.replace(r"(?<=\d)(?=(?:\d\d)+$)", ":", regex=True)
+            kinds[name] = "times of day"
+            del numbers[name]
+    return dataclasses.replace(table, frame=frame, kinds=kinds, numbers=numbers)
+
+
+def _are_times_of_day(values: np.ndarray) -> bool:
+    return are_whole(values, 0, 240_000) and may_be_time_of_day(values)
+
+
+def _begin_daily(values: np.ndarray, digits: int, is_new: np.ndarray, is_named: bool) -> bool:
+    """Whether times of day go up within each day and begin again with the next; unless their name
+    says what they are, in their usual step, as the numbers of several series do not.
+    """
+    begins = np.diff(values) < 0
+    if not begins.any() or (begins != is_new).any() or (np.diff(values) == 0).any():
+        return False
+    clock = values * 10 ** (6 - digits)
+    seconds = clock // 10_000 * 3_600 + clock // 100 % 100 * 60 + clock % 100
+    steps = np.diff(seconds) % 86_400
+    return is_named or np.median(steps[begins]) == np.median(steps)
 
 
 def joined_clock(table: Contents, dates: list[str]) -> Clock | None:
@@ -131,8 +185,9 @@ def clock_of_parts(table: Contents) -> Clock | None:
     columns = tuple(parts.values())
     added = _added(numbers, parts)
     hours = table.of_kind("times of day")
-    if len(hours) == 1 and added is None:
-        text = stamps.dt.strftime("%Y-%m-%d ") + table.frame[hours[0]].astype("str")
+    if len(hours) == 1 and parts.keys().isdisjoint(_MOST):
+        days = stamps if added is None else stamps + added
+        text = days.dt.strftime("%Y-%m-%d ") + table.frame[hours[0]].astype("str")
         return Clock((*columns, hours[0]), text)
     return Clock(columns, stamps, added)
 
