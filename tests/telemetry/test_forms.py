@@ -67,16 +67,18 @@ READ = {
         START,
     ),
     "dates and times of day as numbers": (
-        table("Date,Time,v", DAYS.strftime("%d.%m.%Y"), DAYS.strftime("%-H%M"), VALUES),
+        table("Date,HHMM,v", DAYS.strftime("%d.%m.%Y"), DAYS.strftime("%-H%M"), VALUES),
         DAYS[0],
     ),
     "compact dates and times of day with seconds": (
-        table("Date,b,v", *(DAYS.strftime(form) for form in ("%Y%m%d", "%-H%M%S")), VALUES),
+        table(
+            "Date,HHMMSS UTC,v", *(DAYS.strftime(form) for form in ("%Y%m%d", "%-H%M%S")), VALUES
+        ),
         DAYS[0],
     ),
     "the day of the year, and 2400 at its end": (
         table(
-            "Year,DOY,b,v",
+            "Year,DOY,HHMM,v",
             *((DAYS - pd.Timedelta("1min")).strftime(form) for form in ("%Y", "%j")),
             [f"{time:%-H%M}".replace("000", "2400") for time in DAYS],
             VALUES,
@@ -716,15 +718,6 @@ REFUSED = {
             "date,time,v", stamps("%Y-%m-%d"), (TIMES + pd.Timedelta("9h")).strftime("%H%M"), VALUES
         ),
         "one column, as 2024",
-    ),
-    "numbers of places that begin again each day": (
-        table(
-            "date,place,v",
-            pd.date_range(START, periods=20).date.repeat(3),
-            [101, 102, 103] * 20,
-            VALUES,
-        ),
-        "--series-column place",
     ),
     "a clock behind each signal": (
         table("v,v_time,w,w_time", VALUES, SECONDS, VALUES, 2 * SECONDS),

@@ -87,7 +87,6 @@ def find_clock(table: Contents) -> Clock:
     The table is without columns that are told otherwise, and its numbers without those of columns
     that are asked for as channels.
     """
-    table = with_times_of_day(table)
     frame = table.frame
     numbers = table.numbers
     tells = {name: name_tells(name)[0] for name in table.kinds}
@@ -98,6 +97,8 @@ def find_clock(table: Contents) -> Clock:
         for name, values in numbers.items()
         if tells[name] == 2 and compact_form(values) == "%Y%m%d"
     ]
+    table = with_times_of_day(table, dates or compact)
+    numbers = table.numbers
     if (joined := joined_clock(table, dates or compact)) is not None:
         return joined
     dates = [name for name in dates if tells[name]] or dates

@@ -12,8 +12,6 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.times import (
-    LOOK,
-    compact_form,
     may_be_time_of_day,
     parse_times,
 )
@@ -38,6 +36,7 @@ _PARTS = {
     "second": "second sec ss sekunde sod secondofday",
 } | {unit: UNITS[unit] for unit in ("ms", "us", "ns")}
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
+_TIMES_OF_DAY = {"hhmm", "hhmmss"}
 _FRACTIONS = {"ms": 999, "us": 999_999, "ns": 999_999_999}  # of a second, at most
 _MOST = {"hour": 24, "minute": 60, "second": 60} | _FRACTIONS  # of a time of day
 _STATISTICS = set("max maximum mean avg average".split())  # beside which `min` is no minute
@@ -57,46 +56,28 @@ class Clock(NamedTuple):
     added: pd.Series | None = None  # time spans
 
 
-def with_times_of_day(table: Contents) -> Contents:
-    """Returns a table in which numbers such as 1430 and 143000 are times of day in text: those
-    beside days that are named `HHMM`, or that go up within each day and begin again with the next.
+def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
+    """Returns a table in which the numbers of a column named `HHMM` or `HHMMSS` are times of day in
+    text, if there are days and no other times of day beside it.
     """
-    frame = table.frame.copy(deep=False)
-    kinds = dict(table.kinds)
-    numbers = dict(table.numbers)
-    compact = [name for name, values in numbers.items() if compact_form(values[:LOOK]) == "%Y%m%d"]
-    of_day = (clock_of_parts(table) or Clock()).columns
-    days = frame[[*table.of_kind("dates"), *compact, *of_day]]
+    found = {}
     for name, values in table.numbers.items():
-        if name in days or not _are_times_of_day(values[:LOOK]) or not _are_times_of_day(values):
-            continue
-        form = re.search("hhmm(?:ss)?", name.casefold())
-        digits = 6 if values.max() > 2_400 or form and form[0] == "hhmmss" else 4
-        is_new = days.ne(days.shift()).any(axis=1).to_numpy()[1:]
-        is_named = name_tells(name) == (2, None)
-        if len(days.columns) and (form or _begin_daily(values, digits, is_new, is_named)):
-            text = pd.Series(values.astype(int).astype(str)).str.zfill(digits)
-            frame[name] = text.str.replace(r"(?<=\d)(?=(?:\d\d)+$)", ":", regex=True)
-            kinds[name] = "times of day"
-            del numbers[name]
-    return dataclasses.replace(table, frame=frame, kinds=kinds, numbers=numbers)
-
-
-def _are_times_of_day(values: np.ndarray) -> bool:
-    return are_whole(values, 0, 240_000) and may_be_time_of_day(values)
-
-
-def _begin_daily(values: np.ndarray, digits: int, is_new: np.ndarray, is_named: bool) -> bool:
-    """Whether times of day go up within each day and begin again with the next; unless their name
-    says what they are, in their usual step, as the numbers of several series do not.
-    """
-    begins = np.diff(values) < 0
-    if not begins.any() or (begins != is_new).any() or (np.diff(values) == 0).any():
-        return False
-    clock = values * 10 ** (6 - digits)
-    seconds = clock // 10_000 * 3_600 + clock // 100 % 100 * 60 + clock % 100
-    steps = np.diff(seconds) % 86_400
-    return is_named or np.median(steps[begins]) == np.median(steps)
+        words = _TIMES_OF_DAY.intersection(words_of(name))
+        if words and name_tells(name)[0] == 2:
+            digits = len(words.pop())
+            if are_whole(values, 0, 24 * 10 ** (digits - 2)) and may_be_time_of_day(values):
+                found[name] = pd.Series(values.astype(int).astype(str)).str.zfill(digits)
+    if len(found) != 1 or table.of_kind("times of day") or not (dates or clock_of_parts(table)):
+        return table
+    ((name, text),) = found.items()
+    text = text.str.replace(r"(?<=\d)(?=(?:\d\d)+$)", ":", regex=True)
+    numbers = {other: values for other, values in table.numbers.items() if other != name}
+    return dataclasses.replace(
+        table,
+        frame=table.frame.assign(**{name: text}),
+        kinds={**table.kinds, name: "times of day"},
+        numbers=numbers,
+    )
 
 
 def joined_clock(table: Contents, dates: list[str]) -> Clock | None:

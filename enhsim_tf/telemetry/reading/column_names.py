@@ -10,7 +10,7 @@ _TIMES = set(
     "temps heure horodatage tiempo fecha hora tempo tijd".split()
 )
 BESIDE = set(
-    "since start of run the from local lst gmt cet sim simulation simulated mission rel relative abs "
+    "since start of run the from local gmt cet sim simulation simulated mission rel relative abs "
     "absolute system sample sampling event log logger "
     "record recorded received created at in begin boot experiment test server day julian "
     "modified excel serial number "
