@@ -136,7 +136,7 @@ class Settings:
         0.001,
         stages="enhancer",
         source=OURS,
-        why="0.01 leaves errors of 0.24 and 1.00 after 40 epochs (seeds 0 and 1), this 0.06 to 0.12",
+        why="0.01 leaves errors of 0.24 and 1.00 after 40 epochs (seeds 0, 1), this 0.06 to 0.12",
         author="0.01, for 200 units",
     )
     loss: str = setting(
