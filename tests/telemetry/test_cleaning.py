@@ -31,7 +31,8 @@ settings.load_profile("repeatable")
 N = 400
 START = pd.Timestamp("2020-03-01T00:00:00Z")
 TIMES = pd.date_range(START, periods=N, freq="s")
-VALUES = np.sin(np.arange(N) / 7.3) + 0.01 * np.random.default_rng(0).standard_normal(N)
+ROWS = np.arange(N)
+VALUES = np.sin(ROWS / 7.3) + 0.01 * np.random.default_rng(0).standard_normal(N)
 CLEAN = pd.Series(VALUES, index=TIMES, name="volts")
 
 
@@ -104,32 +105,32 @@ def linear(rows, values=VALUES):
 
 RNG = np.random.default_rng(1)
 # most times are undamaged
-JITTER = pd.to_timedelta(np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")
+JITTER = pd.to_timedelta(np.where(ROWS % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")
 SHUFFLED = RNG.permutation(N)
 NANOSECONDS = TIMES.as_unit("ns").asi8
 ISO, ONE_MORE = TIMES.astype(str).to_numpy(object), np.insert(VALUES, 30, 7)
 WORDS = [f"{value:.9f}" for value in VALUES]
 DROP = {"drop_bad": True}
 DROPPED = {"bad values": 1, "gaps filled": 1}, linear([7]), DROP
+UNDAMAGED_TIMES = {
+    "ISO text": TIMES.astype(str),
+    "ISO text, basic form": TIMES.strftime("%Y%m%dT%H%M%SZ"),
+    "date-times as objects": pd.Index([time.to_pydatetime() for time in TIMES], dtype=object),
+    "epoch seconds": NANOSECONDS // 10**9,
+    "epoch milliseconds": NANOSECONDS // 10**6,
+    "epoch nanoseconds": NANOSECONDS,
+    "epoch nanoseconds as text": NANOSECONDS.astype(str),
+    "periods": pd.period_range("2020-03-01", periods=N, freq="s"),
+    "time spans since 1970": TIMES - pd.Timestamp(0, tz="UTC"),
+}
 UNDAMAGED = {
     "as it should be": CLEAN,
     "a pandas extension type": CLEAN.astype("Float64"),
     "times of another zone": CLEAN.tz_convert("America/New_York"),
-    "ISO text": with_times(TIMES.astype(str)),
-    "ISO text, basic form": with_times(TIMES.strftime("%Y%m%dT%H%M%SZ")),
-    "date-times as objects": with_times(
-        pd.Index([time.to_pydatetime() for time in TIMES], dtype=object)
-    ),
-    "epoch seconds": with_times(NANOSECONDS // 10**9),
-    "epoch milliseconds": with_times(NANOSECONDS // 10**6),
-    "epoch nanoseconds": with_times(NANOSECONDS),
-    "epoch nanoseconds as text": with_times(NANOSECONDS.astype(str)),
-    "periods": with_times(pd.period_range("2020-03-01", periods=N, freq="s")),
-    "time spans since 1970": with_times(TIMES - pd.Timestamp(0, tz="UTC")),
     "categories": with_times(pd.CategoricalIndex(TIMES.astype(str)), pd.Categorical(WORDS)),
     "numbers as text with spaces": with_times(TIMES, [f" {word}\t" for word in WORDS]),
     "decimals as objects": with_times(TIMES, list(map(decimal.Decimal, WORDS))),
-}
+} | {name: with_times(times) for name, times in UNDAMAGED_TIMES.items()}
 # name: series, {kind of finding: count}, values where they are not the clean ones, options
 REPAIRED = {
     "local times with a zone": (
@@ -252,53 +253,49 @@ BAD_VALUES = {
         "MultiIndex",
     ),
 }
+# name: times, words of the message
 BAD_TIMES = {
-    "words": (with_times(["noon"] * N), "'noon' at row 0 of the times of volts (400 in all)"),
-    "days with two-digit years": (with_times(TIMES.strftime("%d/%m/%y %H:%M:%S")), "--time-format"),
+    "words": (["noon"] * N, "'noon' at row 0 of the times of volts (400 in all)"),
+    "days with two-digit years": (TIMES.strftime("%d/%m/%y %H:%M:%S"), "--time-format"),
     "dates as numbers": (
-        with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)),
+        pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int),
         "--time-format %Y%m%d",
     ),
-    "numbers of no unit": (with_times(np.arange(N) + 10**10), "--time-format ms"),
+    "numbers of no unit": (ROWS + 10**10, "--time-format ms"),
     "numbers, text and dates": (
-        with_times(
-            pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)
-        ),
+        pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object),
         "at row 2",
     ),
-    "intervals": (with_times(pd.interval_range(0, N)), "interval"),
+    "intervals": (pd.interval_range(0, N), "interval"),
     "date-times in the year 9000": (
-        with_times(pd.DatetimeIndex(np.array(["9000-01-01"] * N, "datetime64[s]"))),
+        pd.DatetimeIndex(np.array(["9000-01-01"] * N, "datetime64[s]")),
         "1678 to 2261",
     ),
     "centuries apart": (
-        with_times(pd.DatetimeIndex(["1700-01-01", *TIMES.tz_localize(None)[1:]])),
+        pd.DatetimeIndex(["1700-01-01", *TIMES.tz_localize(None)[1:]]),
         "within 292 years",
     ),
-    "infinite": (with_times(np.where(np.arange(N) == 9, np.inf, np.arange(N))), "inf at row 9"),
-    "far away": (with_times(np.where(np.arange(N) == 9, 1e18, np.arange(N))), "1e+18 at row 9"),
-    "true and false": (with_times(np.arange(N) % 2 == 0), "dtype bool"),
-    "complex": (with_times(np.arange(N) + 1j), "complex"),
-    "some with a zone": (
-        with_times([str(TIMES[0]), *TIMES.tz_localize(None).astype(str)[1:]]),
-        "all or none",
-    ),
-    "objects": (with_times(pd.Index([datetime.timedelta] * N, dtype=object)), "at row 0"),
-    "none at all": (with_times(pd.DatetimeIndex([pd.NaT] * N)), "Received: none"),
+    "infinite": (np.where(ROWS == 9, np.inf, ROWS), "inf at row 9"),
+    "far away": (np.where(ROWS == 9, 1e18, ROWS), "1e+18 at row 9"),
+    "true and false": (ROWS % 2 == 0, "dtype bool"),
+    "complex": (ROWS + 1j, "complex"),
+    "some with a zone": ([str(TIMES[0]), *TIMES.tz_localize(None).astype(str)[1:]], "all or none"),
+    "objects": (pd.Index([datetime.timedelta] * N, dtype=object), "at row 0"),
+    "none at all": (pd.DatetimeIndex([pd.NaT] * N), "Received: none"),
     "at random": (
-        with_times(TIMES[0] + pd.to_timedelta(np.cumsum(RNG.exponential(size=N)), unit="s")),
+        TIMES[0] + pd.to_timedelta(np.cumsum(RNG.exponential(size=N)), unit="s"),
         "--interval 0.739",
     ),
     "a local clock set back": (
-        with_times(
-            pd.date_range("2020-10-25T00:30Z", periods=N, freq="min")
-            .tz_convert("Europe/Berlin")
-            .tz_localize(None)
-        ),
+        pd.date_range("2020-10-25T00:30Z", periods=N, freq="min")
+        .tz_convert("Europe/Berlin")
+        .tz_localize(None),
         "--timezone UTC, or the zone of the clock",
     ),
 }
-REFUSED = BAD_VALUES | {f"times: {name}": case for name, case in BAD_TIMES.items()}
+REFUSED = BAD_VALUES | {
+    f"times: {name}": (with_times(times), words) for name, (times, words) in BAD_TIMES.items()
+}
 
 
 @pytest.mark.filterwarnings("error")
@@ -329,8 +326,8 @@ def test_the_interval_is_that_of_the_long_run_before_a_jump_of_the_clock():
     """A jump of 0.4 intervals hides in rounded steps; a line through all rows would have another
     slope.
     """
-    times = 1.1 * np.arange(N) + np.where(np.arange(N) < 300, 0, 0.45)
-    jittered = START + pd.to_timedelta(times + 0.01 * np.sin(np.arange(N)), unit="s")
+    times = 1.1 * ROWS + np.where(ROWS < 300, 0, 0.45)
+    jittered = START + pd.to_timedelta(times + 0.01 * np.sin(ROWS), unit="s")
     assert cleaned_of(with_times(jittered)).report.interval_s == pytest.approx(1.1, abs=2e-5)
 
 
@@ -363,7 +360,7 @@ def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused)
 def test_one_of_several_values_at_the_same_time_is_taken(how, value):
     series = pd.concat([CLEAN.iloc[:11], with_times(TIMES[[11, 11]], [4.0, 6.0]), CLEAN.iloc[12:]])
     cleaned = cleaned_of(series, same_time=how)
-    as_one(cleaned, np.where(np.arange(N) == 11, value, VALUES))
+    as_one(cleaned, np.where(ROWS == 11, value, VALUES))
     (finding,) = repairs(cleaned.report)
     assert (finding.kind, finding.count, finding.rows_left_out) == ("same time", 1, 1)
     assert "2020-03-01T00:00:11" in finding.places[0]
@@ -371,7 +368,7 @@ def test_one_of_several_values_at_the_same_time_is_taken(how, value):
 
 @pytest.mark.parametrize("interval_s", [None, 1.0])
 def test_one_late_row_is_snapped_and_named(interval_s):
-    series = with_times(TIMES + pd.to_timedelta(np.where(np.arange(N) == 70, 0.125, 0.0), unit="s"))
+    series = with_times(TIMES + pd.to_timedelta(np.where(ROWS == 70, 0.125, 0.0), unit="s"))
     found = cleaned_of(series, interval_s=interval_s).report.find("jitter")
     assert (found.count, found.details["largest_s"]) == (1, 0.125)
     assert found.places[0] == "row 70, 2020-03-01T00:01:10.125000+00:00"
@@ -440,7 +437,7 @@ MEAN = (9 + VALUES[50]) / 2
 )
 def test_rows_near_the_same_sample_are_merged_as_asked(options, value):
     series = pd.concat([CLEAN, with_times([TIMES[50] + pd.Timedelta("200ms")], [9.0])]).sort_index()
-    as_one(cleaned_of(series, **options), np.where(np.arange(N) == 50, value, VALUES))
+    as_one(cleaned_of(series, **options), np.where(ROWS == 50, value, VALUES))
 
 
 def test_whole_seconds_that_would_be_dates_of_2299_are_seconds():
@@ -456,7 +453,7 @@ def test_two_rows_are_enough_for_an_interval():
 def test_a_missing_value_at_a_repeated_time_is_ignored(how):
     series = pd.concat([CLEAN.iloc[:6], with_times(TIMES[[5, 6]], [np.nan, 9.0]), CLEAN.iloc[7:]])
     cleaned = cleaned_of(series, same_time=how)
-    as_one(cleaned, np.where(np.arange(N) == 6, 9.0, VALUES))
+    as_one(cleaned, np.where(ROWS == 6, 9.0, VALUES))
     assert cleaned.report.find("missing values").count == 1
     assert cleaned.report.find("same time") is None
 
@@ -532,8 +529,7 @@ def test_jumps_of_the_clock_split_the_series_and_keep_every_row():
     """The grid of the first part lies between the times before and after the first jump, which are
     0.4 s apart.
     """
-    places = np.arange(N)
-    late = pd.to_timedelta(0.4 * (places >= 100) + 0.4 * (places >= 150), unit="s")
+    late = pd.to_timedelta(0.4 * (ROWS >= 100) + 0.4 * (ROWS >= 150), unit="s")
     cleaned = cleaned_of(with_times(TIMES + late))
     before, after = cleaned.parts
     assert after.offset_s == pytest.approx(150 + 0.8 - 0.2)
@@ -570,8 +566,8 @@ def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
 
 
 def test_a_wandering_clock_splits_the_series_before_a_time_is_off_by_more_than_a_quarter():
-    wander = 2 * np.sin(np.arange(N) / 40)  # in intervals; too much to be snapped
-    cleaned = cleaned_of(with_times(TIMES + pd.to_timedelta(wander, unit="s"), np.arange(N)))
+    wander = 2 * np.sin(ROWS / 40)  # in intervals; too much to be snapped
+    cleaned = cleaned_of(with_times(TIMES + pd.to_timedelta(wander, unit="s"), ROWS))
     assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
     begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
     for part in cleaned.parts:
@@ -597,7 +593,7 @@ def test_a_given_interval_averages_the_rows_that_share_it():
     cleaned = cleaned_of(CLEAN, interval_s=4)
     (part,) = cleaned.parts
     # the nearest grid point, with ties to even
-    means = pd.Series(VALUES).groupby(np.round(np.arange(N) / 4)).mean()
+    means = pd.Series(VALUES).groupby(np.round(ROWS / 4)).mean()
     np.testing.assert_allclose(part.values[:, 0], means, atol=1e-6)
     assert (part.interval_s, cleaned.report.find("averaged").rows_left_out) == (4, N - len(part))
 
@@ -661,13 +657,13 @@ def test_values_that_stay_longer_than_others_are_stuck():
     assert (stuck.count, stuck.details["longest"]) == (1, 60)
     assert stuck.places[0].startswith("row 200,")
     # plateaus are what this channel does
-    plateaus = np.where(np.arange(N) // 25 % 2, 1.0, -1.0)
+    plateaus = np.where(ROWS // 25 % 2, 1.0, -1.0)
     plateaus[200:300] = 0.5
     assert found_in(plateaus, "stuck").count == 1
 
 
 def test_a_level_or_a_spread_that_changes_is_reported():
-    drifting = found_in(VALUES + np.arange(N) / 100, "changing level")
+    drifting = found_in(VALUES + ROWS / 100, "changing level")
     low = drifting.details["low"]
     assert len(low) == drifting.count == 10
     assert low[-1] - low[0] == pytest.approx(3.6, abs=1)
