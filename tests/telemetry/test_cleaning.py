@@ -83,8 +83,9 @@ def as_one(cleaned, values=VALUES, off=1e-6):
     return part
 
 
-def float32(values):
-    return np.asarray(values, np.float32)
+def assert_kept(part, values):
+    """Asserts that a part has exactly these values."""
+    np.testing.assert_array_equal(part.values[:, 0], np.asarray(values, np.float32))
 
 
 def set_rows(rows, bad, kind=object):
@@ -469,8 +470,8 @@ GAP = np.arange(100, 106)
 def test_a_gap_of_more_than_max_fill_splits_the_series(series):
     cleaned = cleaned_of(series)
     before, after = cleaned.parts
-    np.testing.assert_array_equal(before.values[:, 0], float32(VALUES[:100]))
-    np.testing.assert_array_equal(after.values[:, 0], float32(VALUES[106:]))
+    assert_kept(before, VALUES[:100])
+    assert_kept(after, VALUES[106:])
     assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start)
     assert len(cleaned.longest) == len(after)
     found = cleaned.report.find("gaps")
@@ -503,13 +504,13 @@ def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row():
     held = cleaned_of(series, interval_s=1.0, fill="hold")
     expected = [*[1.0] * 7, 2.0, *[2.5] * 22, 0.0, *[4.0] * 59, 5.0]
     (part,) = held.parts
-    assert part.values[:, 0].tolist() == expected
+    assert_kept(part, expected)
     assert held.report.samples_filled == len(expected) - 6
     assert "filled with the value before them" in held.report.find("gaps filled").text
     # the last of several rows in an interval counts, and a long gap splits the series if it is
     # asked for
     (coarser,) = cleaned_of(series, interval_s=10.0, fill="hold").parts
-    assert coarser.values[:, 0].tolist() == [1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5]
+    assert_kept(coarser, [1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5])
     split = cleaned_of(series, interval_s=1.0, fill="hold", max_fill=30)
     assert split.report.find("gaps").count == 1
 
@@ -533,8 +534,8 @@ def test_jumps_of_the_clock_split_the_series_and_keep_every_row():
     cleaned = cleaned_of(with_times(TIMES + late))
     before, after = cleaned.parts
     assert after.offset_s == pytest.approx(150 + 0.8 - 0.2)
-    np.testing.assert_array_equal(before.values[:, 0], float32(VALUES[:150]))
-    np.testing.assert_array_equal(after.values[:, 0], float32(VALUES[150:]))
+    assert_kept(before, VALUES[:150])
+    assert_kept(after, VALUES[150:])
     assert (cleaned.report.find("clock steps").count, cleaned.report.rows_used) == (1, N)
 
 
@@ -623,7 +624,7 @@ def test_samples_are_counted_without_times():
         before, after = cleaned.parts
         assert (before.clock.has_time, before.clock.unit) == (False, "samples")
         assert (before.interval_s, before.offset_s, after.offset_s) == (1.0, 0, 120)
-        np.testing.assert_array_equal(after.values[:, 0], float32(values[120:]))
+        assert_kept(after, values[120:])
         gaps = cleaned.report.find("gaps")
         assert gaps.places == ("row 99",) and gaps.details == {"longest": 21.0}
     piece = cleaned_of(pd.Series(VALUES)[50:90])

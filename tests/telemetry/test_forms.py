@@ -50,12 +50,18 @@ def timed(names, times, separator=",", values=VALUES):
     return table(names, cells, values, separator=separator)
 
 
+def framed(**columns):
+    """A frame of the times and the values with further columns."""
+    return pd.DataFrame({"time": TIMES, "v": VALUES} | columns)
+
+
 def commas(values):
     return [str(value).replace(".", ",") for value in values]
 
 
-def only(channels):
-    (series,) = channels.values()
+def one(source, **how):
+    """The only channel of a source."""
+    (series,) = read_source(source, **how).values()
     return series
 
 
@@ -305,7 +311,7 @@ def test_a_form_is_read_with_its_times_and_values(written, form):
     values = VALUES.copy()
     if form == "NaN of C":
         values[30] = (values[29] + values[31]) / 2
-    report = check(only(read_source(written(text))), values, start)
+    report = check(one(written(text)), values, start)
     clock = report.findings[0]
     assert clock.kind == "clock"
     assert clock.details["last_ns"] - clock.details["first_ns"] == (N - 1) * 60 * 10**9
@@ -644,7 +650,7 @@ def check_read(path, how, interval_s=60):
     """Checks that a table has the known values, if it is read in a given way."""
     arguments = {name: how[name] for name in ("columns", "time") if name in how}
     options = Cleaning(**{name: how[name] for name in how if name not in arguments})
-    cleaned = clean(only(read_source(path, **arguments, options=options)))
+    cleaned = clean(one(path, **arguments, options=options))
     assert cleaned.longest.interval_s == pytest.approx(interval_s)
     np.testing.assert_allclose(cleaned.longest.values[:, 0], VALUES, atol=1e-5)
 
@@ -685,7 +691,7 @@ def test_a_part_of_a_time_that_is_out_of_range_loses_its_row_alone(part):
         {"year": 2024, "month": 3, "day": 1, "hour": TIMES.hour, "minute": TIMES.minute}
     ).assign(second=0, v=VALUES)
     frame.loc[30, part] = 99
-    cleaned = clean(only(read_source(frame)))
+    cleaned = clean(one(frame))
     assert cleaned.report.find("missing times").count == 1
     np.testing.assert_allclose(
         np.delete(cleaned.telemetry.values[:, 0], 30), np.delete(VALUES, 30), atol=1e-5
@@ -726,14 +732,14 @@ def test_samples_that_are_counted_are_not_said_to_need_an_interval():
 
 
 def test_a_number_and_its_quality_in_one_cell_are_no_decimal(written):
-    series = only(read_source(written(table("time,air,v", MINUTES, ['"+0200,1"'] * N, VALUES))))
+    series = one(written(table("time,air,v", MINUTES, ['"+0200,1"'] * N, VALUES)))
     check(series)
     assert series.name == "v"
 
 
 def test_units_that_change_from_row_to_row_tell_series_apart():
     units = np.where(ROWS < 30, "V", "mV")
-    channels = read_source(pd.DataFrame({"time": TIMES, "v": VALUES, "unit": units}))
+    channels = read_source(framed(unit=units))
     check(channels["V"], VALUES[:30])
     check(channels["mV"], VALUES[30:], TIMES[30])
 
@@ -752,7 +758,7 @@ def test_a_stated_offset_goes_before_the_option(written, offset, hours):
     path = written(timed("time,v", f"%Y-%m-%d %H:%M:%S{offset}"))
     for zone in ("Asia/Tokyo", None):
         start = START - pd.Timedelta(hours=hours)
-        report = check(only(read_source(path)), start=start, options=Cleaning(timezone=zone))
+        report = check(one(path), start=start, options=Cleaning(timezone=zone))
         clock = report.find("clock").text
         assert "stated" in clock and ("goes before Asia/Tokyo" in clock) == (zone is not None)
 
@@ -760,7 +766,7 @@ def test_a_stated_offset_goes_before_the_option(written, offset, hours):
 def test_a_year_at_the_end_is_no_offset(written):
     form = "%H:%M:%S %d-%m-%Y"
     options = Cleaning(time_format=form, timezone="America/New_York")
-    series = only(read_source(written(timed("time,v", form)), options=options))
+    series = one(written(timed("time,v", form)), options=options)
     check(series, start="2024-03-01T05:00Z", options=options)
 
 
@@ -772,7 +778,7 @@ def test_an_hour_that_a_clock_repeats_is_two_hours(written, begin, shift_s):
     utc += pd.to_timedelta(shift_s * (places % 2), unit="s")
     local = utc.tz_convert("Europe/Berlin").strftime("%Y-%m-%d %H:%M:%S")
     options = Cleaning(timezone="Europe/Berlin")
-    series = only(read_source(written(table("time,v", local, places % 7)), options=options))
+    series = one(written(table("time,v", local, places % 7)), options=options)
     cleaned = clean(series, options)
     assert (cleaned.report.rows_used, len(cleaned.parts)) == (200, 1)
     assert abs(pd.Timestamp(cleaned.parts[0].start) - utc[0]) < pd.Timedelta("10s")
@@ -815,7 +821,7 @@ def test_a_named_column_of_several_series_is_told_apart_too():
 
 def test_a_state_is_no_key_of_series():
     mode = np.where(ROWS % 20 < 10, "sun", "eclipse")
-    check(only(read_source(pd.DataFrame({"time": TIMES, "mode": mode, "v": VALUES}))))
+    check(one(pd.DataFrame({"time": TIMES, "mode": mode, "v": VALUES})))
 
 
 def of_influxdb(*columns, above=""):
@@ -876,9 +882,9 @@ LABELS = {
 @pytest.mark.parametrize("name", ["is_anomaly", "label", "Normal/Attack"])
 def test_labels_are_no_channel_and_mark_rows(name, form):
     frame = pd.DataFrame({"timestamp": TIMES, "v": VALUES, name: LABELS[form]})
-    kept = check(only(read_source(frame)))
+    kept = check(one(frame))
     assert kept.find("labels").count == 3 and f"'{name}'" in kept.find("labels").text
-    missing = clean(only(read_source(frame, options=Cleaning(labelled="missing")))).report
+    missing = clean(one(frame, options=Cleaning(labelled="missing"))).report
     assert (missing.find("missing values").rows_left_out, missing.samples) == (3, N)
 
 
@@ -918,8 +924,8 @@ def test_a_label_may_be_named_or_refused_and_may_concern_one_channel():
 
 
 def test_quality_flags_and_counts_beside_a_clock_are_named_and_left_out():
-    frame = pd.DataFrame({"time": TIMES, "v": VALUES, "v_quality": 192, "number": range(N)})
-    report = check(only(read_source(frame)))
+    frame = framed(v_quality=192, number=range(N))
+    report = check(one(frame))
     assert "v_quality" in report.find("quality flags").text
     assert "number" in report.find("row numbers").text
 
@@ -960,7 +966,7 @@ def test_one_decimal_sign_holds_for_all_columns(written):
     check(channels["watts"], watts)
     check(channels["celsius"])
     texts = [f'"{watt:,}.5"' if watt >= 1000 else f"{watt}.5" for watt in watts]
-    check(only(read_source(written(table("time,watts", MINUTES, texts)))), watts + 0.5)
+    check(one(written(table("time,watts", MINUTES, texts))), watts + 0.5)
 
 
 def test_steps_are_measured_before_gaps_are_filled():
@@ -977,9 +983,9 @@ def test_files_of_several_days_are_one_table(tmp_path, refused):
     (tmp_path / "notes.txt").write_text("not read")
     for name, rows in days.items():
         (tmp_path / name).write_text("".join([header, *rows]))
-    report = check(only(read_source(tmp_path)))
+    report = check(one(tmp_path))
     assert "day1.csv to day10.csv" in report.find("files").text
-    series = only(read_source([tmp_path / name for name in days]))
+    series = one([tmp_path / name for name in days])
     assert series.places.of(30) == "line 2 of day2.csv"
     (tmp_path / "day2.csv").write_text("time,w\n2024-03-02,1\n")
     with refused("'v' not exactly once in day1.csv and day2.csv"):
@@ -988,11 +994,11 @@ def test_files_of_several_days_are_one_table(tmp_path, refused):
 
 def test_packed_files_are_read(tmp_path, refused):
     (tmp_path / "a.csv.gz").write_bytes(gzip.compress(PLAIN.encode()))
-    check(only(read_source(tmp_path / "a.csv.gz")))
+    check(one(tmp_path / "a.csv.gz"))
     path = tmp_path / "a.zip"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("inside.CSV", PLAIN)
-    check(only(read_source(path)))
+    check(one(path))
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("second.csv", PLAIN)
     with refused("inside.CSV, second.csv"):
@@ -1013,7 +1019,7 @@ def workbook(path, *sheets):
 def test_a_workbook_is_read_with_its_dates(tmp_path):
     rows = zip(TIMES.tz_localize(None), VALUES, strict=True)
     sheet = [["Station 7"], [], ["Zeit", "Spannung"], *rows]
-    series = only(read_source(workbook(tmp_path / "a.xlsx", sheet)))
+    series = one(workbook(tmp_path / "a.xlsx", sheet))
     check(series)
     assert (series.name, series.places.of(0)) == ("Spannung", "line 4")
 
@@ -1025,11 +1031,11 @@ def test_a_workbook_whose_first_sheet_has_no_numbers_says_which_sheet_was_read(t
 
 
 def test_pandas_objects_are_sources():
-    frame = pd.DataFrame({"time": TIMES, "v": VALUES})
-    check(only(read_source(frame)))
-    check(only(read_source(frame.set_index("time")["v"])))
+    frame = framed()
+    check(one(frame))
+    check(one(frame.set_index("time")["v"]))
     parts = pd.DataFrame({"year": 2024, "month": 3, "day": 1, "second": SECONDS, "v": VALUES})
-    check(only(read_source(parts.iloc[5:])), VALUES[5:], TIMES[5])
+    check(one(parts.iloc[5:]), VALUES[5:], TIMES[5])
 
 
 @pytest.mark.parametrize("form", ["labelled.csv", "labelled.parquet", "timeeval.csv"])
@@ -1037,7 +1043,7 @@ def test_the_files_of_this_tool_are_read_back(tmp_path, form):
     cleaned = clean(pd.Series(VALUES, index=TIMES, name="value"))
     frame = inject(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0)).table
     write_table(tmp_path / form, frame, ["value"] if form == "timeeval.csv" else ())
-    series = only(read_source(tmp_path / form))
+    series = one(tmp_path / form)
     report = check(series, frame["value"])
     assert series.name == "value" and report.find("labels").count == 10
 
@@ -1058,7 +1064,7 @@ NO_HEADER = Cleaning(no_header=True)
 
 def test_names_may_be_missing(written):
     path = written("\n".join(f"  {value:.7e}" for value in VALUES), "a.txt")
-    series = only(read_source(path, options=NO_HEADER))
+    series = one(path, options=NO_HEADER)
     check(series, start=None, interval_s=1.0)
     assert series.name == "column 0"
 
@@ -1067,14 +1073,14 @@ def test_whole_and_fractional_seconds_are_read_in_one_column(written):
     times = [
         text + ("" if row % 2 else ",250") for row, text in enumerate(stamps("%d.%m.%Y %H:%M:%S"))
     ]
-    stamped = only(read_source(written(table("time;v", times, VALUES, separator=";")))).times.stamps
+    stamped = one(written(table("time;v", times, VALUES, separator=";"))).times.stamps
     assert stamped[0] == pd.Timestamp("2024-03-01T00:00:00.25")
     assert stamped[1] - stamped[0] == pd.Timedelta("59.75s")
 
 
 def test_a_year_and_a_month_are_the_first_day_of_the_month():
     frame = pd.DataFrame({"year": 1990 + ROWS // 12, "month": 1 + ROWS % 12, "v": VALUES})
-    assert only(read_source(frame)).times.stamps[-1] == pd.Timestamp("1994-12-01")
+    assert one(frame).times.stamps[-1] == pd.Timestamp("1994-12-01")
 
 
 def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused):
@@ -1161,7 +1167,7 @@ ORDINARY = {
         ["value"],
     ),
     "rows that were chosen from a frame": (
-        pd.DataFrame({"time": TIMES, "v": VALUES})[VALUES > 16],
+        framed()[VALUES > 16],
         ["v"],
     ),
     "parts of the time beside it": (
@@ -1228,7 +1234,7 @@ def test_series_of_words_beside_series_of_numbers_are_left_out():
 
 def test_hours_that_end_are_those_of_a_day_beside_its_date(written):
     text = table("Date,Hour Ending,v", HOURS.strftime("%Y-%m-%d"), HOURS.hour + 1, VALUES)
-    check(only(read_source(written(text))), start="2024-03-01T01:00Z", interval_s=3600)
+    check(one(written(text)), start="2024-03-01T01:00Z", interval_s=3600)
 
 
 def test_names_may_be_numbers_behind_that_of_the_clock(written):
@@ -1278,8 +1284,8 @@ def test_whole_numbers_that_differ_are_a_channel_where_no_column_has_a_name(writ
 
 
 def test_a_note_says_how_states_beside_channels_are_read():
-    frame = pd.DataFrame({"time": TIMES, "v": VALUES, "valve": ["open"] * 20 + ["closed"] * 40})
-    assert "--states" in clean(only(read_source(frame))).report.find("columns left out").text
+    frame = framed(valve=["open"] * 20 + ["closed"] * 40)
+    assert "--states" in clean(one(frame)).report.find("columns left out").text
 
 
 def test_an_option_that_is_too_long_for_a_message_is_none(refused):
@@ -1291,7 +1297,7 @@ def test_an_option_that_is_too_long_for_a_message_is_none(refused):
 
 
 def test_an_index_may_be_named_like_a_column():
-    frame = pd.DataFrame({"time": TIMES, "v": VALUES}).set_index("time", drop=False)
+    frame = framed().set_index("time", drop=False)
     assert list(read_source(frame)) == list(read_source(frame, time="time.1")) == ["v"]
 
 
