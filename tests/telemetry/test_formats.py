@@ -20,7 +20,8 @@ N = 80
 VALUES = (20 + 5 * np.sin(np.arange(N) / 5)).round(3)
 SECONDS = 0.5 * np.arange(N)
 MINUTES = pd.date_range("2024-03-01", periods=N, freq="min").strftime("%Y-%m-%dT%H:%M:%S")
-FRAME = pd.DataFrame({"time": SECONDS, "volts": VALUES, "amps": 2 * VALUES})
+ARRAYS = {"time": SECONDS, "volts": VALUES, "amps": 2 * VALUES}
+FRAME = pd.DataFrame(ARRAYS)
 
 
 def read(source, **cleaning):
@@ -52,24 +53,26 @@ def matlab_7_3(path):
     path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(512, b" ") + content[512:])
 
 
+def json_lines(path):
+    FRAME.to_json(path, orient="records", lines=True)
+
+
 WRITERS = {
-    ".parquet": lambda path: FRAME.to_parquet(path),
+    ".parquet": FRAME.to_parquet,
     ".xlsx": lambda path: FRAME.to_excel(path, index=False),
     ".xlsm": lambda path: FRAME.to_excel(path, index=False, engine="openpyxl"),
-    ".mat": lambda path: scipy.io.savemat(path, {name: FRAME[name].to_numpy() for name in FRAME}),
+    ".mat": lambda path: scipy.io.savemat(path, ARRAYS),
     ".h5": lambda path: hdf5(path, log=FRAME),
     ".hdf5": lambda path: hdf5(path, log=FRAME),
-    ".jsonl": lambda path: FRAME.to_json(path, orient="records", lines=True),
-    ".ndjson": lambda path: FRAME.to_json(path, orient="records", lines=True),
+    ".jsonl": json_lines,
+    ".ndjson": json_lines,
     ".json": lambda path: FRAME.to_json(path, orient="records"),
 }
 OTHERS = {
     ".dat": lambda path: FRAME.to_csv(path, index=False, sep="\t"),
     ".log.gz": lambda path: path.write_bytes(gzip.compress(FRAME.to_csv(index=False).encode())),
     ".parquet.gz": lambda path: path.write_bytes(gzip.compress(FRAME.to_parquet())),
-    "_struct.mat": lambda path: scipy.io.savemat(
-        path, {"log": {name: FRAME[name].to_numpy() for name in FRAME}, "rate": 2.0}
-    ),
+    "_struct.mat": lambda path: scipy.io.savemat(path, {"log": ARRAYS, "rate": 2.0}),
     "_7_3.mat": matlab_7_3,
 }
 

@@ -83,6 +83,7 @@ ISO = "%Y-%m-%dT%H:%M:%SZ"
 UTC = stamps(ISO)
 PLAIN = table("time,v", UTC, VALUES)
 DECIMAL_COMMAS = commas(VALUES)
+NO_HEADER = Cleaning(no_header=True)
 ELAPSED = [f"{k // 60}:{k % 60:02d}:00" for k in range(1_410, 1_410 + N)]
 # form: lines down to the names, the time in a row, the separator if it is no comma
 DATED = {
@@ -669,17 +670,18 @@ def test_a_form_with_two_meanings_is_refused_and_read_as_the_message_says(writte
 @pytest.mark.parametrize(
     ("header", "form", "interval_s", "values"),
     [
-        ("Year,Month,Day,Mean,Min,Max", "%Y,%m,%d", 86_400, ([8, 9, 7], [3, 5, 2], [14, 15, 12])),
-        ("Year,Month,Day,mm,b,c", "%Y,%m,%d", 86_400, ([3, 5, 2], [8, 9, 7], [1, 2, 1])),
-        ("time,ms,b,c", "%Y-%m-%dT%H:%M:%S", 1, ([23, 950, 480], [8, 9, 7], [1, 2, 1])),
-        ("time,ns,b,c", "%Y-%m-%dT%H:%M:%S", 1, ([5, 7, 6], [8, 9, 7], [1, 2, 1])),
+        ("Year,Month,Day,Mean,Min,Max", "%Y,%m,%d", 86_400, [8, 9, 7]),
+        ("Year,Month,Day,mm,b,c", "%Y,%m,%d", 86_400, [3, 5, 2]),
+        ("time,ms,b,c", "%Y-%m-%dT%H:%M:%S", 1, [23, 950, 480]),
+        ("time,ns,b,c", "%Y-%m-%dT%H:%M:%S", 1, [5, 7, 6]),
     ],
 )
 def test_what_is_named_like_a_part_of_a_time_but_is_none_is_a_channel(
     written, header, form, interval_s, values
 ):
     times = pd.date_range("2024-03-01", periods=12, freq=f"{interval_s}s").strftime(form)
-    channels = read_source(written(table(header, times, *(4 * each for each in values))))
+    text = table(header, times, 4 * values, 4 * [3, 5, 2], 4 * [14, 15, 12])
+    channels = read_source(written(text))
     names = header.split(",")[-3:]
     assert list(channels) == names
     assert clean(channels[names[0]]).telemetry.interval_s == interval_s
@@ -719,10 +721,19 @@ def test_numbers_that_turn_hexadecimal_further_down_are_words(written, refused):
         clean(read_source(written(text))["code"])
 
 
-def test_a_column_without_a_name_that_does_not_count_by_one_may_be_the_clock(written, refused):
-    path = written(table("", 250 * ROWS, VALUES))
-    with refused("--time 'column 0' --time-format ms"):
-        read_source(path, options=Cleaning(no_header=True))
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        (250 * ROWS, "--time 'column 0' --time-format ms"),
+        ((SECONDS + 20 * np.sin(ROWS)).round(2), "--time 'column 0'"),
+    ],
+    ids=["steps of no whole second", "steps of any length"],
+)
+def test_a_column_without_a_name_that_does_not_count_by_one_may_be_the_clock(
+    written, refused, times, words
+):
+    with refused(words):
+        read_source(written(timed("", times)), options=NO_HEADER)
 
 
 def test_samples_that_are_counted_are_not_said_to_need_an_interval():
@@ -813,12 +824,6 @@ def test_several_series_in_one_table_are_told_apart(written, form):
     assert check(channels["b"], VALUES + 9, START + late).find("series").count == 2
 
 
-def test_a_named_column_of_several_series_is_told_apart_too():
-    frame = HOSTS.assign(other=2.0)
-    assert list(read_source(frame, ["v"])) == ["a", "b"]
-    assert list(read_source(frame, ["a.v"])) == ["a.v"] and len(read_source(frame)) == 4
-
-
 def test_a_state_is_no_key_of_series():
     mode = np.where(ROWS % 20 < 10, "sun", "eclipse")
     check(one(pd.DataFrame({"time": TIMES, "mode": mode, "v": VALUES})))
@@ -841,12 +846,21 @@ def test_a_blank_line_at_the_end_of_several_series_is_none_of_them(written):
     assert cells == {"amps": VALUES.tolist(), "volts": (VALUES + 1).tolist()}
 
 
-def test_the_columns_of_series_and_values_can_be_named():
-    frame, options = long(number=(7, 8)).assign(other=1.0), Cleaning(series_column="number")
+@pytest.mark.parametrize(
+    ("frame", "names", "options"),
+    [
+        (HOSTS, ["a", "b"], Cleaning()),
+        (long(number=(7, 8)), ["7", "8"], Cleaning(series_column="number")),
+    ],
+)
+def test_the_columns_of_series_and_values_can_be_named(frame, names, options):
+    frame = frame.assign(other=1.0)
     channels = read_source(frame, ["v"], options=options)
-    assert list(channels) == ["7", "8"]
-    assert list(read_source(frame, ["8.v"], options=options)) == ["8.v"]
-    check(channels["8"], VALUES + 9)
+    assert list(channels) == names
+    check(channels[names[1]], VALUES + 9)
+    last = f"{names[1]}.v"
+    assert list(read_source(frame, [last], options=options)) == [last]
+    assert len(read_source(frame, options=options)) == 4
 
 
 def annotated(field, values, result="_result"):
@@ -1059,9 +1073,6 @@ def test_copies_of_a_run_are_series():
     check(channels["copy 1"], VALUES + 9)
 
 
-NO_HEADER = Cleaning(no_header=True)
-
-
 def test_names_may_be_missing(written):
     path = written("\n".join(f"  {value:.7e}" for value in VALUES), "a.txt")
     series = one(path, options=NO_HEADER)
@@ -1264,12 +1275,6 @@ def test_rows_without_the_word_of_others_are_a_series():
 )
 def test_the_size_of_a_number_says_the_unit_of_a_time_since_1970(size, unit):
     assert epoch_unit(size) == unit
-
-
-def test_a_clock_with_steps_of_any_length_is_asked_for_where_no_column_has_a_name(written, refused):
-    times = (SECONDS + 20 * np.sin(ROWS)).round(2)
-    with refused("--time 'column 0'"):
-        read_source(written(table("", times, VALUES)), options=NO_HEADER)
 
 
 def test_hexadecimal_numbers_leave_other_columns_without_names_what_they_are(written):
