@@ -53,6 +53,11 @@ def pairs(batch_size):
     return Pairs(SOURCE, TARGET, batch_size, RNG(3))
 
 
+def assert_alike(arrays, others, atol=0.0):
+    for array, other in zip(arrays, others, strict=True):
+        np.testing.assert_allclose(array, other, rtol=0, atol=atol)
+
+
 def trained(network, rate, epochs, batch_size):
     """Trains by blocks if a kernel is wide, otherwise by Keras; returns the losses of the epochs."""
     options = {"epochs": epochs, "verbose": 0, "shuffle": False}
@@ -80,8 +85,7 @@ def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
     plain.compile(keras.optimizers.Adam(rate()), loss="mean_squared_error")
     losses = plain.fit(pairs(batch_size), epochs=3, verbose=0, shuffle=False).history["loss"]
     np.testing.assert_allclose(found, losses, rtol=3e-6)
-    for weight, of_plain in zip(network.get_weights(), plain.get_weights(), strict=True):
-        np.testing.assert_allclose(weight, of_plain, atol=5e-6)
+    assert_alike(network.get_weights(), plain.get_weights(), atol=5e-6)
     assert np.abs(network.get_weights()[0] - small_enhancer().get_weights()[0]).max() > 1e-3
 
 
@@ -90,8 +94,7 @@ def test_the_same_seed_gives_the_same_weights(monkeypatch):
     network, again = small_enhancer(), small_enhancer()
     for each in (network, again):
         trained(each, 0.001, 1, 20)
-    for weight, same in zip(network.get_weights(), again.get_weights(), strict=True):
-        np.testing.assert_array_equal(weight, same)
+    assert_alike(network.get_weights(), again.get_weights())
 
 
 def wide_stack(*others, **changed):
@@ -199,10 +202,9 @@ def test_what_does_not_fire_passes_no_gradient(inputs):
 @pytest.mark.parametrize("rate", [0.3, 0.95])  # at 0.95 some filters lose every frame
 def test_gradients_with_dropped_products(rate):
     rng, seed = RNG(0), tf.constant([3, 4])
-    shapes = [tf.TensorShape((number, 11, 14)) for number in (10, 10, 3)]
     kept = [
-        fast_keras._kept(shape, rate, each)
-        for shape, each in zip(shapes, tf.unstack(tf.random.split(seed, 3)), strict=True)
+        fast_keras._kept(tf.TensorShape((number, 11, 14)), rate, each)
+        for number, each in zip((10, 10, 3), tf.unstack(tf.random.split(seed, 3)), strict=True)
     ]
     kept = tf.concat(kept, axis=0)
     assert np.mean(kept) == pytest.approx(1 - rate, abs=0.05)
@@ -225,8 +227,7 @@ def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
         gan.train_discriminator(rows, of_paper.labels(16, of_paper.REAL))
         assert all((old != new.numpy()).any() for old, new in zip(before, drops, strict=True))
         trained.append([weight.numpy() for weight in gan.discriminator_weights])
-    for one, other in zip(*trained, strict=True):
-        np.testing.assert_array_equal(one, other)
+    assert_alike(*trained)
 
 
 @pytest.mark.parametrize(

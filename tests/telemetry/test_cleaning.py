@@ -88,6 +88,10 @@ def assert_kept(part, values):
     np.testing.assert_array_equal(part.values[:, 0], np.asarray(values, np.float32))
 
 
+def in_seconds(numbers):
+    return pd.to_timedelta(numbers, unit="s")
+
+
 def set_rows(rows, bad, kind=object):
     values = CLEAN.astype(kind)
     values.iloc[rows] = bad
@@ -106,7 +110,7 @@ def linear(rows, values=VALUES):
 
 RNG = np.random.default_rng(1)
 # most times are undamaged
-JITTER = pd.to_timedelta(np.where(ROWS % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")
+JITTER = in_seconds(np.where(ROWS % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0))
 SHUFFLED = RNG.permutation(N)
 NANOSECONDS = TIMES.as_unit("ns").asi8
 ISO, ONE_MORE = TIMES.astype(str).to_numpy(object), np.insert(VALUES, 30, 7)
@@ -284,7 +288,7 @@ BAD_TIMES = {
     "objects": (pd.Index([datetime.timedelta] * N, dtype=object), "at row 0"),
     "none at all": (pd.DatetimeIndex([pd.NaT] * N), "Received: none"),
     "at random": (
-        TIMES[0] + pd.to_timedelta(np.cumsum(RNG.exponential(size=N)), unit="s"),
+        TIMES[0] + in_seconds(np.cumsum(RNG.exponential(size=N))),
         "--interval 0.739",
     ),
     "a local clock set back": (
@@ -328,7 +332,7 @@ def test_the_interval_is_that_of_the_long_run_before_a_jump_of_the_clock():
     slope.
     """
     times = 1.1 * ROWS + np.where(ROWS < 300, 0, 0.45)
-    jittered = START + pd.to_timedelta(times + 0.01 * np.sin(ROWS), unit="s")
+    jittered = START + in_seconds(times + 0.01 * np.sin(ROWS))
     assert cleaned_of(with_times(jittered)).report.interval_s == pytest.approx(1.1, abs=2e-5)
 
 
@@ -369,7 +373,7 @@ def test_one_of_several_values_at_the_same_time_is_taken(how, value):
 
 @pytest.mark.parametrize("interval_s", [None, 1.0])
 def test_one_late_row_is_snapped_and_named(interval_s):
-    series = with_times(TIMES + pd.to_timedelta(np.where(ROWS == 70, 0.125, 0.0), unit="s"))
+    series = with_times(TIMES + in_seconds(np.where(ROWS == 70, 0.125, 0.0)))
     found = cleaned_of(series, interval_s=interval_s).report.find("jitter")
     assert (found.count, found.details["largest_s"]) == (1, 0.125)
     assert found.places[0] == "row 70, 2020-03-01T00:01:10.125000+00:00"
@@ -412,7 +416,7 @@ def test_a_clock_that_lost_every_third_digit_is_not_averaged(refused):
 
 
 def test_steps_that_differ_are_rows_missing_and_no_other_rate():
-    times = START + pd.to_timedelta(np.cumsum([1] * 200 + [3, 4] * 40), unit="s")
+    times = START + in_seconds(np.cumsum([1] * 200 + [3, 4] * 40))
     assert cleaned_of(with_times(times, VALUES[: len(times)])).report.find("other rates") is None
 
 
@@ -495,7 +499,7 @@ def test_a_gap_of_max_fill_is_filled_on_a_given_grid_as_well():
 
 
 def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row():
-    times = START + pd.to_timedelta([0, 7, 8, 30, 31.2, 90], unit="s")
+    times = START + in_seconds([0, 7, 8, 30, 31.2, 90])
     series = with_times(times, [1.0, 2.0, 2.5, 0.0, 4.0, 5.0])
     held = cleaned_of(series, interval_s=1.0, fill="hold")
     expected = [*[1.0] * 7, 2.0, *[2.5] * 22, 0.0, *[4.0] * 59, 5.0]
@@ -526,7 +530,7 @@ def test_jumps_of_the_clock_split_the_series_and_keep_every_row():
     """The grid of the first part lies between the times before and after the first jump, which are
     0.4 s apart.
     """
-    late = pd.to_timedelta(0.4 * (ROWS >= 100) + 0.4 * (ROWS >= 150), unit="s")
+    late = in_seconds(0.4 * (ROWS >= 100) + 0.4 * (ROWS >= 150))
     cleaned = cleaned_of(with_times(TIMES + late))
     before, after = cleaned.parts
     assert after.offset_s == pytest.approx(150 + 0.8 - 0.2)
@@ -553,7 +557,7 @@ def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
     """
     offsets, differences = np.array([[-0.4, -0.2, 0.0, 0.2, 0.4], [1.0, -2.0, 0.5, 2.0, -1.5]])
     inside = np.arange(where + 1, where + 51)
-    times = START + pd.to_timedelta((inside[:, None] + offsets).ravel(), unit="s")
+    times = START + in_seconds((inside[:, None] + offsets).ravel())
     fine = with_times(times, (VALUES[inside, None] + differences).ravel())
     cleaned = cleaned_of(pd.concat([CLEAN.drop(TIMES[inside]), fine]).sort_index())
     as_one(cleaned, off=1e-5)
@@ -564,7 +568,7 @@ def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
 
 def test_a_wandering_clock_splits_the_series_before_a_time_is_off_by_more_than_a_quarter():
     wander = 2 * np.sin(ROWS / 40)  # in intervals; too much to be snapped
-    cleaned = cleaned_of(with_times(TIMES + pd.to_timedelta(wander, unit="s"), ROWS))
+    cleaned = cleaned_of(with_times(TIMES + in_seconds(wander), ROWS))
     assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
     begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
     for part in cleaned.parts:
@@ -736,7 +740,7 @@ def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, ma
     kept = np.setdiff1d(np.arange(300), lost)
     with_value = np.setdiff1d(kept, blank)
     rows = rng.permutation(np.concatenate([kept, np.intersect1d(twice, kept)])).astype(int)
-    times = START + pd.to_timedelta(rows + off[rows], unit="s")
+    times = START + in_seconds(rows + off[rows])
     series = with_times(times, np.where(np.isin(rows, blank), np.nan, values[rows]))
     cleaned = clean(series, Cleaning(max_fill=max_fill, min_part=1))
     check_balance(cleaned)
@@ -767,7 +771,7 @@ def test_a_logger_clock_with_jitter_is_read_at_its_median_rate():
     """Steps of 4 ms, of which each is longer or shorter by up to a half, as flight loggers have."""
     rng, number = np.random.default_rng(5), 4_000
     seconds = np.cumsum(4e-3 * rng.uniform(0.5, 1.5, number))
-    times = START + pd.to_timedelta(seconds, unit="s")
+    times = START + in_seconds(seconds)
     cleaned = clean(pd.Series(np.sin(3 * seconds), times), Cleaning(min_part=32))
     assert cleaned.report.find("jitter") and len(cleaned.parts) == 1
     assert cleaned.report.rows_used > 0.6 * number

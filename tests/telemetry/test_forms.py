@@ -85,7 +85,8 @@ PLAIN = table("time,v", UTC, VALUES)
 DECIMAL_COMMAS = commas(VALUES)
 NO_HEADER = Cleaning(no_header=True)
 ELAPSED = [f"{k // 60}:{k % 60:02d}:00" for k in range(1_410, 1_410 + N)]
-# form: lines down to the names, the time in a row, the separator if it is no comma
+# form: lines down to the names, the time in a row or the times in all, the separator if it is no
+# comma, the values in other forms
 DATED = {
     "hundreds of blank lines": ("time,v" + "\n" * 400, ISO),
     "a compact date, hours and minutes": ("Date,Hour,Minute,v", "%Y%m%d,%H,%M"),
@@ -135,6 +136,13 @@ DATED = {
     "dates of PVGIS": ("time,v", "%Y%m%d:%H%M"),
     "beginning and end with a dash": ("time,v", "%d.%m.%Y %H:%M - 01.04.2024 00:00"),
     "names in a comment above an empty one": ("# time,v\n#", ISO),
+    "points": ("Zeit;U", "%d.%m.%Y %H:%M:%S", ";", DECIMAL_COMMAS),
+    "years of two digits": ("Zeit;v", "%d.%m.%y %H:%M", ";", DECIMAL_COMMAS),
+    "milliseconds since 1970": ("timestamp,v", 1000 * UNIX),
+    "modified Julian dates": ("MJD,v", [f"{60370 + second / 86400:.9f}" for second in SECONDS]),
+    "Julian dates": ("JD,v", [f"{2460370.5 + second / 86400:.9f}" for second in SECONDS]),
+    "MATLAB's days": ("datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS]),
+    "halves of a day in small letters": ("time,v", stamps("%Y-%m-%d %I:%M %p").str.lower()),
 }
 # form: lines down to the names, the times in the rows, the separator if it is no comma
 COUNTED = {
@@ -156,26 +164,14 @@ COUNTED = {
 }
 # form: text
 OTHERS = {
-    "points": timed("Zeit;U", "%d.%m.%Y %H:%M:%S", ";", DECIMAL_COMMAS),
     "a date in the first row of the day": table(
         "date,clock,v", ["2024-03-01"] + [""] * (N - 1), CLOCK, VALUES
     ),
-    "years of two digits": timed("Zeit;v", "%d.%m.%y %H:%M", ";", DECIMAL_COMMAS),
     "midnight as hour 24": timed("time,v", "%Y-%m-%d %H:%M").replace(
         "2024-03-01 00:00", "2024-02-29 24:00"
     ),
     "seconds of the day": table("year,doy,sod,v", stamps("%Y,%j"), SECONDS, VALUES),
     "a sign for the row number": table("#,time,v", range(N), MINUTES, VALUES),
-    "milliseconds since 1970": table("timestamp,v", 1000 * UNIX, VALUES),
-    "modified Julian dates": table(
-        "MJD,v", [f"{60370 + second / 86400:.9f}" for second in SECONDS], VALUES
-    ),
-    "Julian dates": table(
-        "JD,v", [f"{2460370.5 + second / 86400:.9f}" for second in SECONDS], VALUES
-    ),
-    "MATLAB's days": table(
-        "datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS], VALUES
-    ),
     "the time once more": table("date,epoch,v", stamps("%Y-%m-%d %H:%M:%S"), UNIX, VALUES),
     "numbers of a server's entries": table("time,entry_id,v", UTC, range(700, 700 + N), VALUES),
     "quality after capitals": table("time,v,OPCQuality", UTC, VALUES, [192] * N),
@@ -218,9 +214,6 @@ OTHERS = {
         below="$RT_OFF$;2024-03-01T01:00:00Z;0\n",
     ),
     "elapsed times beside a clock": table("timestamp,uptime,v", UNIX, ELAPSED, VALUES),
-    "halves of a day in small letters": table(
-        "time,v", stamps("%Y-%m-%d %I:%M %p").str.lower(), VALUES
-    ),
     "seconds of the day beside hours and minutes": table(
         "Date,Time,sec,v", stamps("%Y-%m-%d,%H:%M"), SECONDS + 1, VALUES
     ),

@@ -137,54 +137,53 @@ def test_every_row_of_a_dirty_table_is_accounted_for(written):
     )
 
 
-BAD = {
-    "not there": ("absent.csv", None, {}, "does not exist"),
-    "a name no file can have": ("x" * 300 + ".csv", None, {}, "does not exist"),
-    "a folder without tables": (".", None, {}, "without any"),
-    "unknown kind": ("a.xlsx", b"x", {}, "a.xlsx"),
-    "empty": ("a.csv", b"", {}, "empty"),
-    "comments only": ("a.csv", b"# a\n# b\n", {}, "a.csv"),
-    "bytes": ("a.csv", bytes(range(256)) * 20, {}, "not text"),
-    "no header": ("a.csv", b"1,2\n3,4\n5,6\n", {}, "1, 2"),
-    "lines longer than the header": ("a.csv", b"a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
+# case: bytes of a table, words of the message, arguments
+BAD_TABLES = {
+    "empty": (b"", "empty"),
+    "comments only": (b"# a\n# b\n", "a.csv"),
+    "bytes": (bytes(range(256)) * 20, "not text"),
+    "no header": (b"1,2\n3,4\n5,6\n", "1, 2"),
+    "lines longer than the header": (b"a,b\n1,2,3\n4,5,6\n", "a.csv"),
     "one name for two columns, named": (
-        "a.csv",
         b"a,a,b\n1,2,3\n3,4,5\n",
-        {"columns": ["a"]},
         "a.1, a.2, b",
+        {"columns": ["a"]},
     ),
-    "no such column": ("a.csv", b"a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
+    "no such column": (b"a,b\n1,2\n", "'c'", {"columns": ["c"]}),
     "two time columns": (
-        "a.csv",
         b"start,planned,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n",
-        {},
         "start, planned",
     ),
-    "words only": ("a.csv", b"a,b\nx,y\nz,w\n", {}, "none in a.csv"),
-    "no columns named": ("a.csv", b"a,b\n1,2\n", {"columns": []}, "columns=[]"),
-    "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
+    "words only": (b"a,b\nx,y\nz,w\n", "none in a.csv"),
+    "no columns named": (b"a,b\n1,2\n", "columns=[]", {"columns": []}),
+}
+# case: name and content of the file, words of the message, arguments
+BAD = {
+    "not there": ("absent.csv", None, "does not exist"),
+    "a name no file can have": ("x" * 300 + ".csv", None, "does not exist"),
+    "a folder without tables": (".", None, "without any"),
+    "unknown kind": ("a.xlsx", b"x", "a.xlsx"),
+    "no Parquet": ("a.parquet", b"PAR1 but no more", "a.parquet"),
     "windows": (
         "a.parquet",
         pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}),
-        {},
         "left out: window ([1. 2.])",
     ),
     "two levels of names": (
         "a.parquet",
         pd.DataFrame([[1.0]], columns=pd.MultiIndex.from_tuples([("a", "x")])),
-        {},
         "2 levels",
     ),
-    "no array": ("a.npy", b"not an array", {}, "a.npy"),
-    "a column number too large": ("a.npy", np.zeros((3, 2)), {"columns": ["2"]}, "'2'"),
-    "a time of an array": ("a.npy", np.zeros(3), {"time": "t"}, "'t'"),
-}
+    "no array": ("a.npy", b"not an array", "a.npy"),
+    "a column number too large": ("a.npy", np.zeros((3, 2)), "'2'", {"columns": ["2"]}),
+    "a time of an array": ("a.npy", np.zeros(3), "'t'", {"time": "t"}),
+} | {case: ("a.csv", *others) for case, others in BAD_TABLES.items()}
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("case", BAD)
 def test_bad_sources_are_refused(tmp_path, refused, case):
-    name, content, arguments, words = BAD[case]
+    name, content, words, *arguments = BAD[case]
     path = tmp_path / name
     if isinstance(content, pd.DataFrame):
         content.to_parquet(path)
@@ -193,7 +192,7 @@ def test_bad_sources_are_refused(tmp_path, refused, case):
     elif content is not None:
         path.write_bytes(content)
     with refused(words):
-        read_source(path, **arguments)
+        read_source(path, **dict(*arguments))
 
 
 def test_influxdb_refuses_columns_and_an_incomplete_location(monkeypatch, refused):
