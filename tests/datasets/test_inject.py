@@ -34,11 +34,6 @@ def change_of(injected):
     return injected.table["value"].to_numpy() - VOLTS
 
 
-def places_of(injected):
-    """The kind, the beginning and the end of each anomaly."""
-    return [(each.kind, each.begin, each.end) for each in injected.anomalies]
-
-
 def test_labels_of_samples_by_hand():
     mask = np.array([0, 1, 0, 1, 0, 0, 1, 1], bool)[:, None]
     labels = [PlacedEvent("spike", 4.0, 1, 3), PlacedEvent("ramp", 2.0, 6, 2)]
@@ -81,7 +76,7 @@ def test_given_anomalies_by_hand():
     np.testing.assert_allclose(np.abs(change[100:150]), 0.8, rtol=1e-4)  # 4 sd of 0.2, up or down
     np.testing.assert_allclose(injected.table["value"][150:160], VOLTS[150] - 0.4, rtol=1e-6)
     assert np.flatnonzero(change).tolist() == [*range(100, 160), 1_200, 1_225, 1_250]
-    assert places_of(injected) == [
+    assert [(each.kind, each.begin, each.end) for each in injected.anomalies] == [
         ("level_shift", 100, 150),
         ("dropout", 150, 160),
         ("spike", 1_200, 1_251),

@@ -108,23 +108,25 @@ def test_samples_without_a_run_get_no_score(of_run, telemetry):
     assert frame["flag"].mean() < 0.05
 
 
+def row_of_event(clock, times, *places):
+    """The row of an event in samples at these times."""
+    event = Event(*places, 2.0, 0.9, "learnt", ("step", "level"), ("volts",))
+    scored = ScoredTelemetry(pd.DataFrame(index=times), {}, (event,), 16, clock)
+    return events_table(scored).iloc[0]
+
+
 def test_an_event_across_a_gap_ends_one_interval_after_its_last_sample():
-    seconds = np.array([0, 10, 20, 500, 510])
-    frame = pd.DataFrame(index=pd.to_datetime(seconds, unit="s", utc=True))
-    event = Event(1, 5, 2, 3, 4, 2.0, 0.9, "learnt", ("step", "level"), ("volts",))
-    scored = ScoredTelemetry(frame, {}, (event,), 16, Clock.of(10.0, "2024-01-01"))
-    table = events_table(scored)
-    times = table[["begin", "end", "detected", "peak"]].iloc[0]
-    assert [time.timestamp() for time in times] == [10, 520, 20, 500]
-    assert (table["views"][0], table["channels"][0]) == ("step, level", "volts")
+    times = pd.to_datetime([0, 10, 20, 500, 510], unit="s", utc=True)
+    row = row_of_event(Clock.of(10.0, "2024-01-01"), times, 1, 5, 2, 3, 4)
+    found = [row[name].timestamp() for name in ("begin", "end", "detected", "peak")]
+    assert found == [10, 520, 20, 500]
+    assert (row["views"], row["channels"]) == ("step, level", "volts")
 
 
 def test_an_event_of_a_fast_clock_ends_one_interval_after_its_last_sample():
     clock = Clock.of(2e-7, "2024-01-01")
-    frame = pd.DataFrame(index=clock.index(2e-7 * np.arange(5)))
-    event = Event(1, 3, 2, 2, 2, 2.0, 0.9, "learnt", ("level",), ("volts",))
-    table = events_table(ScoredTelemetry(frame, {}, (event,), 16, clock))
-    assert table["end"][0] == frame.index[3]
+    times = clock.index(2e-7 * np.arange(5))
+    assert row_of_event(clock, times, 1, 3, 2, 2, 2)["end"] == times[3]
 
 
 def test_times_of_a_clock_from_zero_are_written_as_seconds(single, telemetry, tmp_path):

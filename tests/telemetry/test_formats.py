@@ -156,14 +156,6 @@ def test_a_zone_above_the_table_of_a_sheet_is_asked_for(tmp_path, refused):
     assert read(path, timezone="Europe/Berlin").start == "2024-02-29T23:00:00+00:00"
 
 
-@pytest.mark.parametrize(
-    ("name", "text"), [("a.jsonl", "[" * 100_000), ("b.json", json.dumps({"a": 1})[:-1])]
-)
-def test_json_that_is_too_deep_or_cut_is_refused(written, refused, name, text):
-    with refused(name, "cannot be read"):
-        read(written(text, name))
-
-
 def test_texts_of_fixed_length_in_records_of_hdf5_are_times(tmp_path):
     records = FRAME.assign(time=MINUTES).to_records(index=False, column_dtypes={"time": "S19"})
     with h5py.File(tmp_path / "a.h5", "w") as file:
@@ -171,6 +163,13 @@ def test_texts_of_fixed_length_in_records_of_hdf5_are_times(tmp_path):
     telemetry = read(tmp_path / "a.h5")
     check(telemetry, 60.0)
     assert telemetry.start == "2024-03-01T00:00:00+00:00"
+
+
+def with_attribute(path, key, value):
+    """A file of HDF5 in which the times have an attribute."""
+    with h5py.File(hdf5(path, log=FRAME), "r+") as file:
+        file["log/time"].attrs[key] = value
+    return path
 
 
 @pytest.mark.parametrize(
@@ -183,19 +182,15 @@ def test_texts_of_fixed_length_in_records_of_hdf5_are_times(tmp_path):
     ],
 )
 def test_units_beside_data_of_hdf5_are_those_of_the_clock(tmp_path, key, unit, interval_s):
-    path = hdf5(tmp_path / "a.h5", log=FRAME)
-    with h5py.File(path, "r+") as file:
-        file["log/time"].attrs[key] = unit
-    assert read(path).interval_s == pytest.approx(interval_s)
+    telemetry = read(with_attribute(tmp_path / "a.h5", key, unit))
+    assert telemetry.interval_s == pytest.approx(interval_s)
 
 
 @pytest.mark.parametrize(
-    ("attribute", "value"), [("scale_factor", 0.1), ("units", "hours since 2024-01-01")]
+    ("key", "value"), [("scale_factor", 0.1), ("units", "hours since 2024-01-01")]
 )
-def test_values_that_are_to_be_converted_are_refused(tmp_path, refused, attribute, value):
-    path = hdf5(tmp_path / "a.h5", log=FRAME)
-    with h5py.File(path, "r+") as file:
-        file["log/time"].attrs[attribute] = value
+def test_values_that_are_to_be_converted_are_refused(tmp_path, refused, key, value):
+    path = with_attribute(tmp_path / "a.h5", key, value)
     with refused("log/time", "xarray"):
         read(path)
 
@@ -234,10 +229,9 @@ def test_files_of_other_units_are_not_joined(tmp_path, refused):
     ]
     with refused("'time' of different units"):
         read(of_numbers)
-    with_attributes = [hdf5(tmp_path / f"{unit}.h5", log=FRAME) for unit in ("s", "ms")]
-    for path in with_attributes:
-        with h5py.File(path, "r+") as file:
-            file["log/time"].attrs["units"] = path.stem
+    with_attributes = [
+        with_attribute(tmp_path / f"{unit}.h5", "units", unit) for unit in ("s", "ms")
+    ]
     with refused("'time' of different units", "s.h5 to ms.h5"):
         read(with_attributes)
 

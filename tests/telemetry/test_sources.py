@@ -162,8 +162,6 @@ BAD = {
     "not there": ("absent.csv", None, "does not exist"),
     "a name no file can have": ("x" * 300 + ".csv", None, "does not exist"),
     "a folder without tables": (".", None, "without any"),
-    "unknown kind": ("a.xlsx", b"x", "a.xlsx"),
-    "no Parquet": ("a.parquet", b"PAR1 but no more", "a.parquet"),
     "windows": (
         "a.parquet",
         pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}),
