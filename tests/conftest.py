@@ -117,6 +117,19 @@ def refused():
 
 
 @pytest.fixture
+def written(tmp_path):
+    """`written(text)` writes a text or a frame to a file, and returns its path."""
+
+    def written(content, name="a.csv"):
+        path = tmp_path / name
+        text = content if isinstance(content, str) else content.to_csv(index=False)
+        path.write_text(text, encoding="utf-8", newline="")
+        return path
+
+    return written
+
+
+@pytest.fixture
 def pretended(monkeypatch):
     """Environment variables that name a server of InfluxDB that does not exist."""
     pytest.importorskip("influxdb_client")

@@ -22,18 +22,19 @@ def drive(num_samples=2_000, seed=0):
     )
 
 
-def pair_of(values, delay, others=(), interval_s=10.0, noise=0.3):
+def pair_of(values, delay, others=(), noise=0.3):
     """A recording of the values, and telemetry that follows it `delay` samples later."""
     rng = np.random.default_rng(1)
     telemetry = np.roll(values, delay) + noise * values.std() * rng.standard_normal(len(values))
     columns = np.stack([*others, values], axis=1).astype(np.float32)
-    recording = parts_of(
-        (Part(columns),),
-        tuple(f"c{number}" for number in range(columns.shape[1])),
-        interval_s,
-        START,
-    )
-    return Telemetry.of(telemetry.astype(np.float32), interval_s, 0.0, START, "volts"), recording
+    names = [f"c{number}" for number in range(columns.shape[1])]
+    recording = parts_of((Part(columns),), names, 10.0, START)
+    return Telemetry.of(telemetry.astype(np.float32), 10.0, 0.0, START, "volts"), recording
+
+
+def from_start(recording, start):
+    """A recording whose clock begins at another time."""
+    return dataclasses.replace(recording, clock=Clock.of(recording.interval_s, start))
 
 
 def recorded(parts):
@@ -50,10 +51,9 @@ def test_a_known_delay_is_recovered(delay):
 
 
 def test_a_delay_is_recovered_across_gaps_and_a_negative_correlation():
-    telemetry, recording = pair_of(-drive(), 7)
-    telemetry = dataclasses.replace(telemetry, parts=(Part(-telemetry.values),))
+    telemetry, recording = pair_of(drive(), 7)
     parts = [telemetry.part(0, 700), telemetry.part(760, 1_500), telemetry.part(1_530, 2_000)]
-    values = recording.values
+    values = -recording.values
     recording = dataclasses.replace(
         recording, parts=(Part(values[:900]), Part(values[950:], 9_500.0))
     )
@@ -75,18 +75,15 @@ def test_a_delay_longer_than_a_window_is_refused_with_the_delay_to_give(refused)
     with refused("at most a window, 64 samples", "--delay 2000"):
         estimate_delay(telemetry, recording, 64)
     found, run = pair_recordings(recorded([telemetry]), recording, 2_000.0)
-    assert (
-        found.parts[0].offset_s == 2_000
-        and np.corrcoef(found.values[:, 0], run.values[:, 0])[0, 1] > 0.9
-    )
+    assert found.parts[0].offset_s == 2_000
+    assert np.corrcoef(found.values[:, 0], run.values[:, 0])[0, 1] > 0.9
 
 
 def test_both_are_cut_to_the_time_they_share():
     telemetry, recording = pair_of(drive(), 0, noise=0)
     recording = dataclasses.replace(
-        recording,
-        clock=Clock.of(10.0, "2024-01-01T00:10:00+00:00"),
-        parts=(Part(recording.parts[0].values[60:1_000]),),
+        from_start(recording, "2024-01-01T00:10:00+00:00"),
+        parts=(Part(recording.values[60:1_000]),),
     )
     parts = [telemetry.part(0, 500), telemetry.part(520, 2_000)]
     found, run = pair_recordings(recorded(parts), recording)
@@ -97,16 +94,16 @@ def test_both_are_cut_to_the_time_they_share():
 
 def test_runs_of_another_time_are_refused(refused):
     telemetry, recording = pair_of(drive(), 0)
-    elsewhere = dataclasses.replace(
-        recording, clock=Clock.of(recording.interval_s, "2025-01-01T00:00:00+00:00")
-    )
+    elsewhere = from_start(recording, "2025-01-01T00:00:00+00:00")
     assert estimate_delay(telemetry, elsewhere, 64).column is None
-    with refused("overlaps the telemetry in time", "--delay"):
-        pair_recordings(recorded([telemetry]), elsewhere)
-    with refused("in both the telemetry and the coarse run, or in neither"):
-        pair_recordings(
-            recorded([telemetry]),
-            dataclasses.replace(recording, clock=Clock.of(recording.interval_s, None)),
-        )
-    with refused("at least 3000 samples"):
-        pair_recordings(recorded([telemetry]), recording, least_samples=3_000)
+    for words, run, least_samples in (
+        (["overlaps the telemetry in time", "--delay"], elsewhere, 2),
+        (
+            ["in both the telemetry and the coarse run, or in neither"],
+            from_start(recording, None),
+            2,
+        ),
+        (["at least 3000 samples"], recording, 3_000),
+    ):
+        with refused(*words):
+            pair_recordings(recorded([telemetry]), run, least_samples=least_samples)

@@ -20,27 +20,20 @@ def recording():
     return parts_of(parts, ("a", "b"), 10.0, name="run.csv")
 
 
-def table(num_samples=60, step_s=10):
-    rows = np.arange(num_samples)
-    stamps = pd.Timestamp("2024-01-01") + pd.to_timedelta(rows * step_s, unit="s")
-    return pd.DataFrame(
-        {
-            "time": stamps,
-            "volts": 0.5 * rows,
-            "amps": 7.0 - rows,
-            "scenario": np.where(rows < 20, "nominal", "leak"),
-            "mask": rows // 20,
-        }
-    )
-
-
-@pytest.fixture
-def written(tmp_path):
-    def write(frame, name="run.csv"):
-        frame.to_csv(tmp_path / name, index=False)
-        return tmp_path / name
-
-    return write
+ROWS = np.arange(60)
+HALVES = 0.5 * ROWS
+SCENARIO = ["nominal"] * 20 + ["leak"] * 40
+MASK = [0] * 20 + [1] * 20 + [2] * 20
+TABLE = pd.DataFrame(
+    {
+        "time": pd.date_range("2024-01-01", periods=60, freq="10s"),
+        "volts": HALVES,
+        "amps": 7.0 - ROWS,
+        "scenario": SCENARIO,
+        "mask": MASK,
+    }
+)
+BOTH = ["volts", "amps"]
 
 
 # in memory
@@ -65,122 +58,101 @@ def test_a_recording_refuses_what_it_does_not_hold(refused):
 
 
 def test_a_table_is_read_with_its_labels(written):
-    found = read_recording(
-        written(table()[[*"time amps volts scenario mask".split()]]), ["volts", "amps"]
-    )
+    found = read_recording(written(TABLE[["time", "amps", "volts", "scenario", "mask"]]), BOTH)
     (part,) = found.parts
-    assert (found.columns, found.interval_s, found.start) == (
-        ("volts", "amps"),
-        10.0,
-        "2024-01-01T00:00:00+00:00",
-    )
-    np.testing.assert_array_equal(
-        part.values, np.stack([0.5 * np.arange(60), 7.0 - np.arange(60)], 1).astype(np.float32)
-    )
-    assert list(part.carried["scenario"]) == ["nominal"] * 20 + ["leak"] * 40
-    assert list(part.carried["mask"]) == [0] * 20 + [1] * 20 + [2] * 20 and "mask" in " ".join(
-        found.notes
-    )
+    assert (found.columns, found.interval_s) == (("volts", "amps"), 10.0)
+    assert found.start == "2024-01-01T00:00:00+00:00"
+    np.testing.assert_array_equal(part.values, TABLE[BOTH])
+    assert list(part.carried["scenario"]) == SCENARIO and list(part.carried["mask"]) == MASK
+    assert "mask" in " ".join(found.notes)
 
 
 def test_columns_without_numbers_are_no_inputs_and_named(written):
-    assert any(
-        "columns without numbers: scenario, pump" in note
-        for note in read_recording(written(table().assign(pump="true"))).notes
-    )
+    notes = read_recording(written(TABLE.assign(pump="true"))).notes
+    assert any("columns without numbers: scenario, pump" in note for note in notes)
 
 
 def test_labels_follow_the_repairs_of_the_rows(written):
-    frame = table()
-    # unsorted, with a short gap
-    frame = pd.concat([frame.iloc[30:], frame.iloc[:30].drop(index=[5, 6])])
-    frame = pd.concat([frame, frame.iloc[[3]]])  # one row twice
-    found = read_recording(written(frame), ["volts", "amps"])
+    # unsorted, with a short gap, and one row twice
+    frame = TABLE.iloc[[*range(30, 60), *range(5), *range(7, 30), 3]]
+    found = read_recording(written(frame), BOTH)
     (part,) = found.parts
-    np.testing.assert_allclose(part.values[:, 0], 0.5 * np.arange(60))
-    assert list(part.carried["scenario"]) == ["nominal"] * 20 + ["leak"] * 40
-    assert len(found.notes) >= 2 and all("run.csv" in note for note in found.notes)
+    np.testing.assert_allclose(part.values[:, 0], HALVES)
+    assert list(part.carried["scenario"]) == SCENARIO
+    assert len(found.notes) >= 2 and all("a.csv" in note for note in found.notes)
 
 
 def test_labels_are_those_of_the_series_that_is_read(written):
     """Two hosts at the same times, one after the other: that of b has drifted where that of a is
     nominal.
     """
-    frame = pd.concat(
-        [
-            table(6).assign(host="a", scenario="nominal"),
-            table(6).assign(host="b", scenario=[*"nnnddd"]),
-        ]
+    hosts = TABLE.iloc[[*range(6), *range(6)]].assign(
+        host=[*"aaaaaabbbbbb"], scenario=[*"nnnnnnnnnddd"]
     )
-    (part,) = read_recording(written(frame[["time", "host", "volts", "scenario"]]), ["b"]).parts
+    (part,) = read_recording(written(hosts[["time", "host", "volts", "scenario"]]), ["b"]).parts
     assert list(part.carried["scenario"]) == [*"nnnddd"] and set(part.carried["host"]) == {"b"}
 
 
 def test_a_run_in_several_files_keeps_its_labels(written, tmp_path):
-    written(table().iloc[:30], "1.csv")
-    written(table().iloc[30:], "2.csv")
-    for source in (tmp_path, [tmp_path / "1.csv", tmp_path / "2.csv"]):
+    paths = [written(TABLE.iloc[:30], "1.csv"), written(TABLE.iloc[30:], "2.csv")]
+    for source in (tmp_path, paths):
         (part,) = read_recording(source, ["volts"]).parts
-        assert list(part.carried["scenario"]) == ["nominal"] * 20 + ["leak"] * 40
+        assert list(part.carried["scenario"]) == SCENARIO
 
 
 def test_another_rate_is_brought_to_the_wanted_one(written):
-    finer, coarser = (
-        read_recording(written(table(), f"{step}.csv"), ["volts"], interval_s=step)
-        for step in (30, 5)
-    )
+    path = written(TABLE)
+    averaged, finer = (read_recording(path, ["volts"], interval_s=step) for step in (30, 5))
     # means of three rows around each grid point
-    np.testing.assert_allclose(finer.parts[0].values[1:-1, 0], 0.5 * 3 * np.arange(1, 20))
-    np.testing.assert_allclose(coarser.parts[0].values[:, 0], 0.25 * np.arange(119))
-    assert (
-        "averaged to one every 30 s" in finer.notes[-1]
-        and "interpolated to one every 5 s" in coarser.notes[-1]
-    )
+    np.testing.assert_allclose(averaged.parts[0].values[1:-1, 0], 3 * HALVES[1:20])
+    assert "averaged to one every 30 s" in averaged.notes[-1]
+    np.testing.assert_allclose(finer.parts[0].values[:, 0], 0.25 * np.arange(119))
+    assert "interpolated to one every 5 s" in finer.notes[-1]
     # up to 195 s, half-way between two rows
-    assert list(coarser.parts[0].carried["scenario"]).count("nominal") == 40
+    assert list(finer.parts[0].carried["scenario"]).count("nominal") == 40
 
 
 def test_missing_values_split_the_run_or_are_filled(written):
-    frame = table()
+    frame = TABLE.copy()
     frame.loc[10:11, "volts"] = np.nan
     frame.loc[30:44, "amps"] = np.nan
-    found = read_recording(written(frame), ["volts", "amps"])
+    found = read_recording(written(frame), BOTH)
     assert [len(part) for part in found.parts] == [30, 15]
-    np.testing.assert_allclose(found.parts[0].values[:, 0], 0.5 * np.arange(30))
-    assert list(found.parts[1].carried["mask"]) == [2] * 15 and any(
-        "2 parts" in note for note in found.notes
-    )
+    np.testing.assert_allclose(found.parts[0].values[:, 0], HALVES[:30])
+    assert list(found.parts[1].carried["mask"]) == [2] * 15
+    assert any("2 parts" in note for note in found.notes)
 
 
 def test_a_run_without_times_counts_its_samples(written):
-    found = read_recording(written(table().drop(columns="time")), ["volts"])
-    assert found.start is None and found.interval_s == 1.0 and found.parts[0].offset_s == 0
-    assert list(found.parts[0].carried["scenario"])[18:22] == ["nominal", "nominal", "leak", "leak"]
+    found = read_recording(written(TABLE.drop(columns="time")), ["volts"])
+    (part,) = found.parts
+    assert (found.start, found.interval_s, part.offset_s) == (None, 1.0, 0)
+    assert list(part.carried["scenario"]) == SCENARIO
 
 
 def test_unusable_runs_are_refused(refused, written):
-    with refused("'watts'", "volts"):
-        read_recording(written(table()), ["volts", "watts"])
-    frame = table()
-    frame.loc[:29, "volts"], frame.loc[30:, "amps"] = np.nan, np.nan
-    with refused("share some time"):
-        read_recording(written(frame), ["volts", "amps"])
-    frame = table().astype({"volts": object})
-    frame.loc[3, "volts"] = "offline"
-    with refused("offline"):
-        read_recording(written(frame), ["volts"])
-    with refused("without times"):
-        read_recording(written(table().drop(columns="time")), ["volts"], interval_s=10.0)
+    apart, words = TABLE.copy(), TABLE.astype({"volts": object})
+    apart.loc[:29, "volts"] = apart.loc[30:, "amps"] = np.nan
+    words.loc[3, "volts"] = "offline"
+    for said, frame, columns, options in (
+        (["'watts'", "volts"], TABLE, ["volts", "watts"], {}),
+        (["share some time"], apart, BOTH, {}),
+        (["offline"], words, ["volts"], {}),
+        (["without times"], TABLE.drop(columns="time"), ["volts"], {"interval_s": 10.0}),
+    ):
+        with refused(*said):
+            read_recording(written(frame), columns, **options)
 
 
 # runs of other simulators
 
 
+EVEN = 2.0 * ROWS
+
+
 def stepped(times):
     """A run whose columns are known functions of time."""
-    return pd.DataFrame(
-        {"time": times, "volts": 1.5 * np.asarray(times), "amps": 7.0 - np.asarray(times)}
-    )
+    return pd.DataFrame({"time": times, "volts": 1.5 * times, "amps": 7.0 - times})
 
 
 def test_steps_of_any_length_are_interpolated(written):
@@ -189,32 +161,27 @@ def test_steps_of_any_length_are_interpolated(written):
     (part,) = found.parts
     assert found.columns == ("volts", "amps") and part.offset_s == 0
     np.testing.assert_allclose(part.values[:, 0], 3.0 * np.arange(len(part)), atol=1e-3)
-    assert (
-        len(part) == int(times[-1] // 2) + 1 and "interpolated to one every 2 s" in found.notes[0]
-    )
+    assert len(part) == int(times[-1] // 2) + 1
+    assert "interpolated to one every 2 s" in found.notes[0]
 
 
 @pytest.mark.parametrize(
     "events", [[20.0, 40.0], [21.3, 44.9]], ids=["at samples", "between samples"]
 )
 def test_an_event_has_the_value_after_it(written, events):
-    steady = stepped(2.0 * np.arange(60))
-    after = stepped(np.repeat(events, 2)).assign(
-        volts=lambda frame: frame["volts"] + np.tile([0.0, 5.0], len(events))
-    )
-    frame = pd.concat([steady, after]).sort_values("time", kind="stable")
-    found = read_recording(written(frame), ["volts"], interval_s=2.0)
-    (part,) = found.parts
+    after = stepped(np.repeat(events, 2))
+    after["volts"] += np.tile([0.0, 5.0], len(events))
+    frame = pd.concat([stepped(EVEN), after]).sort_values("time", kind="stable")
+    (part,) = read_recording(written(frame), ["volts"], interval_s=2.0).parts
     assert len(part) == 60
-    is_event = np.isin(2.0 * np.arange(60), events)
-    between = np.isin(np.arange(60), np.ceil(np.array(events) / 2)) & ~is_event
-    np.testing.assert_allclose(
-        part.values[~between, 0], (3.0 * np.arange(60) + 5.0 * is_event)[~between], atol=1e-5
-    )
+    is_event = np.isin(EVEN, events)
+    between = np.isin(ROWS, np.ceil(np.array(events) / 2)) & ~is_event
+    expected = 1.5 * EVEN + 5.0 * is_event
+    np.testing.assert_allclose(part.values[~between, 0], expected[~between], atol=1e-5)
 
 
 def test_the_zero_of_a_run_can_be_given(written, refused):
-    path = written(stepped(2.0 * np.arange(60)))
+    path = written(stepped(EVEN))
     found = read_recording(path, start="2024-03-01T02:00:00+01:00")
     assert found.start == "2024-03-01T01:00:00+00:00"
     telemetry = parts_of(
@@ -225,16 +192,16 @@ def test_the_zero_of_a_run_can_be_given(written, refused):
     with refused("--coarse-start 2024-03-01T01:00:04"):
         pair_recordings(telemetry, read_recording(path))
     with refused("--coarse-start"):
-        read_recording(written(table()), start="2024-03-01")
+        read_recording(written(TABLE), start="2024-03-01")
 
 
 def test_a_frame_is_a_run_whose_clock_is_no_input():
     for time in (None, "none"):
-        assert read_recording(stepped(2.0 * np.arange(60)), time=time).columns == ("volts", "amps")
+        assert read_recording(stepped(EVEN), time=time).columns == ("volts", "amps")
 
 
 def test_a_run_of_which_most_rows_share_their_time_is_refused(refused):
-    table = pd.DataFrame({"time": np.repeat(np.arange(20.0), 3), "volts": np.arange(60.0)})
+    frame = pd.DataFrame({"time": np.repeat(np.arange(20.0), 3), "volts": ROWS})
     with refused("60 rows with 20 different times"):
-        read_recording(table)
-    assert len(read_recording(table.iloc[::3])) == 20
+        read_recording(frame)
+    assert len(read_recording(frame.iloc[::3])) == 20

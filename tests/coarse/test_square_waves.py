@@ -26,17 +26,8 @@ ONSET = 100  # a quarter of the 400 samples
 
 def test_square_wave_by_hand():
     wave = SquareWave(period_s=4, low=-1, high=3)
-    assert wave(np.array([-4.0, -1, 0, 1, 2, 3, 4, 5.9, 6])).tolist() == [
-        3,
-        -1,
-        3,
-        3,
-        -1,
-        -1,
-        3,
-        3,
-        -1,
-    ]
+    values = wave(np.array([-4.0, -1, 0, 1, 2, 3, 4, 5.9, 6]))
+    assert values.tolist() == [3, -1, 3, 3, -1, -1, 3, 3, -1]
     wave = SquareWave(period_s=8, phase=0.25, duty=0.75, low=0, high=1)
     # a quarter of a period ahead: the six high samples of eight began two samples ago
     assert wave(np.arange(8.0)).tolist() == [1, 1, 1, 1, 0, 0, 1, 1]
@@ -53,9 +44,8 @@ def test_bad_wave_is_refused(refused, argument):
 def test_simulator_is_the_sum_of_its_waves(refused):
     first, second = TWO.waves
     assert (TWO(TIMES) == first(TIMES) + second(TIMES)).all()
-    assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(
-        TIMES
-    ).dtype == np.float32
+    simulated = TWO.simulate(TIMES)
+    assert simulated.dtype == np.float32 and (simulated == TWO(TIMES).astype(np.float32)).all()
     assert TWO.levels == (0.5, 2.0)
     assert level_offset_and_scale(TWO) == (1.25, 0.75)
     with refused("waves=[]"):
@@ -89,23 +79,20 @@ def test_fit_recovers_a_noisy_wave(shape, period_s, interval_s, offset_s):
     mean, amplitude, rng, number = 20.0, 3.0, np.random.default_rng(0), 3_000
     ahead = rng.random()
     times = offset_s + interval_s * np.arange(number)
-    values = mean + amplitude * (
-        wave(np.mod(times / period_s + ahead, 1.0)) + 0.2 * rng.standard_normal(number)
-    )
+    cycle = np.mod(times / period_s + ahead, 1.0)
+    values = mean + amplitude * (wave(cycle) + 0.2 * rng.standard_normal(number))
     telemetry = Telemetry.of(values.astype(np.float32), interval_s=interval_s, offset_s=offset_s)
-    train, test = telemetry.part(0, 2_030), telemetry.part(2_130, number)
 
-    (fitted,) = SquareWaveSimulator.fit(train).waves
+    (fitted,) = SquareWaveSimulator.fit(telemetry.part(0, 2_030)).waves
     assert fitted.period_s == pytest.approx(period_s, rel=0.005)
     # on a slope, the edge of the box is not well determined
     assert fitted.duty == pytest.approx(duty, abs=0.03)
-    assert (fitted.low, fitted.high) == pytest.approx(
-        (mean + amplitude * low, mean + amplitude * high), abs=0.05 * amplitude
-    )
+    levels = mean + amplitude * low, mean + amplitude * high
+    assert (fitted.low, fitted.high) == pytest.approx(levels, abs=0.05 * amplitude)
 
     # the phase also holds at later times that were not fitted
-    truth = np.where(np.mod(test.time_s / period_s + ahead, 1.0) < duty, 1, 0)
-    assert np.mean((fitted(test.time_s) > mean) == truth) > 0.92
+    is_high = fitted(times[2_130:]) > mean
+    assert np.mean(is_high == (cycle[2_130:] < duty)) > 0.92
 
 
 def test_fit_refuses_a_series_without_a_period(refused):
@@ -130,36 +117,28 @@ def test_box_finds_the_fundamental_under_a_stronger_harmonic():
 # degraded modes
 
 
-def degrade(signal, times, scenario, levels, rng=0):
+def degrade(signal, times, scenario, levels):
     """Degrades a signal whose shortest period is 40 s, as the coarse simulator is degraded."""
-    onset = scenario.first_sample(times.shape[1])
+    onset, rng = scenario.first_sample(times.shape[1]), np.random.default_rng(0)
     return of_paper.degrade(
-        signal,
-        times,
-        scenario.mode,
-        scenario.severity,
-        levels,
-        40.0,
-        np.random.default_rng(rng),
-        onset,
+        signal, times, scenario.mode, scenario.severity, levels, 40.0, rng, onset
     )
 
 
-def by_time(mode, severity, onset=0.25, rng=0):
+def by_time(mode, severity):
     """Degrades a signal that returns the time itself, which shows how the mode changes the
     mechanism's time.
     """
-    return degrade(
-        lambda time: time.copy(), TIMES, Degraded(mode, severity, onset), (-1.0, 3.0), rng
-    )
+    return degrade(lambda time: time.copy(), TIMES, Degraded(mode, severity), (-1.0, 3.0))
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_nominal_to_the_bit_before_the_onset_and_not_after(mode):
     before = TIMES.copy()
-    nominal, (none, degraded) = (
-        TWO.simulate(TIMES),
-        (TWO.simulate(TIMES, Degraded(mode, each), np.random.default_rng(1)) for each in (0, 0.3)),
+    nominal = TWO.simulate(TIMES)
+    none, degraded = (
+        TWO.simulate(TIMES, Degraded(mode, severity), np.random.default_rng(1))
+        for severity in (0, 0.3)
     )
     assert none.tobytes() == nominal.tobytes()
     assert degraded.shape == nominal.shape and degraded.dtype == np.float32
@@ -170,10 +149,8 @@ def test_nominal_to_the_bit_before_the_onset_and_not_after(mode):
 
 @pytest.mark.parametrize("onset", [0.0, 0.29, 0.57])
 def test_onset_is_the_sample_asked_for(onset):
-    times = np.arange(100.0)[None]
-    values = degrade(
-        lambda time: 5 + 0 * time, times, Degraded("gain_loss", 1.0, onset), (0.0, 2.0)
-    )
+    scenario = Degraded("gain_loss", 1.0, onset)
+    values = degrade(lambda time: 5 + 0 * time, np.arange(100.0)[None], scenario, (0.0, 2.0))
     assert np.argmax(values[0] != 5) == round(100 * onset)
 
 

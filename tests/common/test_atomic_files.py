@@ -43,6 +43,17 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+def put(path, text="new"):
+    """Writes a folder with one file."""
+    with replace_folder(path) as temporary:
+        (temporary / "inside").write_text(text)
+
+
+def is_only(folder, name, text):
+    """Whether a folder holds nothing but a folder with one file."""
+    return content_of(folder) == {f"{name}/inside": text} and names_in(folder) == [name]
+
+
 def run(script, renames, *paths):
     """The exit code of a process that is killed after so many renames."""
     words = [sys.executable, "-c", KILLED + script, str(renames), *map(str, paths)]
@@ -99,8 +110,7 @@ def test_replace_folder_replaces_whatever_is_there(tmp_path, before):
         path.touch()
     elif before == "a link":
         path.symlink_to(tmp_path / "elsewhere")
-    with replace_folder(path) as temporary:
-        (temporary / "inside").write_text("new")
+    put(path)
     assert content_of(tmp_path) == {"above/model/inside": "new"}
     assert names_in(path.parent) == ["model"]
 
@@ -122,9 +132,8 @@ def test_an_interrupt_keeps_the_old_content(tmp_path, what, before):
 
 
 def test_a_failure_between_the_two_renames_restores_the_old_content(tmp_path, monkeypatch):
-    path, rename, calls = tmp_path / "model", os.replace, []
-    path.mkdir()
-    (path / "inside").write_text("old")
+    rename, calls = os.replace, []
+    put(tmp_path / "model", "old")
 
     def fails(source, destination):
         calls.append(source)
@@ -133,17 +142,16 @@ def test_a_failure_between_the_two_renames_restores_the_old_content(tmp_path, mo
         rename(source, destination)
 
     monkeypatch.setattr(os, "replace", fails)
-    with pytest.raises(OSError, match="no space"), replace_folder(path) as temporary:
-        (temporary / "inside").write_text("new")
-    assert content_of(tmp_path) == {"model/inside": "old"} and names_in(tmp_path) == ["model"]
+    with pytest.raises(OSError, match="no space"):
+        put(tmp_path / "model")
+    assert is_only(tmp_path, "model", "old")
 
 
 @pytest.mark.parametrize("then", ["remove_leftovers", "replace_folder"])
 @pytest.mark.parametrize("renames", [0, 1])  # while it writes, and between its renames
 def test_a_kill_leaves_the_old_content(tmp_path, then, renames):
     path = tmp_path / "model.v2"
-    path.mkdir()
-    (path / "inside").write_text("old")
+    put(path, "old")
     killed(path, "folder", renames)
     assert path.exists() == (renames == 0) and len(names_in(tmp_path)) > 1
     if then == "remove_leftovers":
@@ -151,7 +159,7 @@ def test_a_kill_leaves_the_old_content(tmp_path, then, renames):
     else:
         with pytest.raises(RuntimeError), replace_folder(path):
             raise RuntimeError
-    assert content_of(tmp_path) == {"model.v2/inside": "old"} and names_in(tmp_path) == ["model.v2"]
+    assert is_only(tmp_path, "model.v2", "old")
 
 
 def test_files_that_a_killed_process_left_are_removed(tmp_path):
@@ -167,8 +175,7 @@ def test_what_a_running_process_writes_is_no_leftover(tmp_path):
     with replace_folder(tmp_path / "model") as temporary, replace_file(tmp_path / "notes") as notes:
         (temporary / "inside").write_text("new")
         notes.write_text("new")
-        with replace_folder(tmp_path / "model") as other:
-            (other / "inside").write_text("other")
+        put(tmp_path / "model", "other")
         remove_leftovers(tmp_path)
     assert content_of(tmp_path) == {"model/inside": "new", "notes": "new"}
 
@@ -182,13 +189,13 @@ def test_files_that_only_look_like_leftovers_stay(tmp_path):
 
 
 def test_replace_folder_keeps_the_old_content_if_keep_says_so(tmp_path):
+    def is_whole(folder):
+        return (folder / "inside").read_text() == "whole"
+
     for text, expected in (("broken", "broken"), ("whole", "whole"), ("other", "whole")):
-        with replace_folder(
-            tmp_path / "stage", lambda there: (there / "inside").read_text() == "whole"
-        ) as temporary:
+        with replace_folder(tmp_path / "stage", is_whole) as temporary:
             (temporary / "inside").write_text(text)
-        assert content_of(tmp_path) == {"stage/inside": expected}
-        assert names_in(tmp_path) == ["stage"]
+        assert is_only(tmp_path, "stage", expected)
 
 
 def test_many_writers_at_once_leave_one_whole_folder(tmp_path):
@@ -222,14 +229,20 @@ def test_json_without_nan_and_its_checksum(tmp_path):
     )
 
 
+def two_files(folder, before):
+    """The paths of two files, which are there before or not."""
+    paths = [folder / "one", folder / "two"]
+    for path in paths if before else ():
+        path.write_text("old")
+    return paths
+
+
 @pytest.mark.parametrize("before", [False, True])
 @pytest.mark.parametrize("fails", ["one", "two"])
 def test_files_that_belong_together_are_replaced_together_or_not_at_all(
     tmp_path, monkeypatch, before, fails
 ):
-    paths, rename = [tmp_path / "one", tmp_path / "two"], os.replace
-    for path in paths if before else ():
-        path.write_text("old")
+    paths, rename = two_files(tmp_path, before), os.replace
     kept = content_of(tmp_path)
 
     def failing(source, destination):
@@ -255,9 +268,8 @@ def test_files_that_belong_together_are_replaced_together_or_not_at_all(
 @pytest.mark.parametrize("before", [False, True])
 @pytest.mark.parametrize("renames", range(1, 6))
 def test_a_kill_between_renames_leaves_all_old_files_or_all_new_ones(tmp_path, before, renames):
-    paths = [tmp_path / "one", tmp_path / "two"]
-    for path in paths if before else ():
-        path.write_text("old")
+    paths = two_files(tmp_path, before)
+    old = content_of(tmp_path)
     script = """
 with atomic_files.replace_files(*sys.argv[2:]) as temporaries:
     for temporary in temporaries:
@@ -267,6 +279,5 @@ with atomic_files.replace_files(*sys.argv[2:]) as temporaries:
     is_done = renames > 1 + 2 * (1 + before)
     assert run(script, renames, *paths) == (0 if is_done else -9)
     remove_leftovers(tmp_path)
-    old = {"one": "old", "two": "old"} if before else {}
     assert content_of(tmp_path) == ({"one": "new", "two": "new"} if is_done else old)
     assert names_in(tmp_path) == sorted(content_of(tmp_path))

@@ -53,6 +53,11 @@ def pairs(batch_size):
     return Pairs(SOURCE, TARGET, batch_size, RNG(3))
 
 
+def assert_alike(arrays, others, atol=0.0):
+    for array, other in zip(arrays, others, strict=True):
+        np.testing.assert_allclose(array, other, rtol=0, atol=atol)
+
+
 def trained(network, rate, epochs, batch_size):
     """Trains by blocks if a kernel is wide, otherwise by Keras; returns the losses of the epochs."""
     options = {"epochs": epochs, "verbose": 0, "shuffle": False}
@@ -80,8 +85,7 @@ def test_it_trains_as_keras_adam_does(monkeypatch, rows, batch_size, rate):
     plain.compile(keras.optimizers.Adam(rate()), loss="mean_squared_error")
     losses = plain.fit(pairs(batch_size), epochs=3, verbose=0, shuffle=False).history["loss"]
     np.testing.assert_allclose(found, losses, rtol=3e-6)
-    for weight, of_plain in zip(network.get_weights(), plain.get_weights(), strict=True):
-        np.testing.assert_allclose(weight, of_plain, atol=5e-6)
+    assert_alike(network.get_weights(), plain.get_weights(), atol=5e-6)
     assert np.abs(network.get_weights()[0] - small_enhancer().get_weights()[0]).max() > 1e-3
 
 
@@ -90,27 +94,30 @@ def test_the_same_seed_gives_the_same_weights(monkeypatch):
     network, again = small_enhancer(), small_enhancer()
     for each in (network, again):
         trained(each, 0.001, 1, 20)
-    for weight, same in zip(network.get_weights(), again.get_weights(), strict=True):
-        np.testing.assert_array_equal(weight, same)
+    assert_alike(network.get_weights(), again.get_weights())
 
 
-WIDE = {"units": 1_200, "kernel_initializer": "zeros"}
+def wide_stack(*others, **changed):
+    """A Dense layer that is wide and plain, but for what is changed, and other layers."""
+    wide = {"units": 1_200, "kernel_initializer": "zeros"}
+    return keras.Sequential([keras.Input((1_200,)), keras.layers.Dense(**wide | changed), *others])
 
 
 @pytest.mark.parametrize(
-    ("layers", "is_wide"),
+    "changed",
     [
-        ([keras.layers.Dense(**WIDE, activation="relu")], True),
-        ([keras.layers.Dense(4, kernel_initializer="zeros")], False),
-        ([keras.layers.Dense(**WIDE, activation="tanh")], False),
-        ([keras.layers.Dense(**WIDE, use_bias=False)], False),
-        ([keras.layers.Dense(**WIDE, kernel_regularizer="l2")], False),
-        ([keras.layers.Dense(**WIDE, trainable=False)], False),
-        ([keras.layers.Dense(**WIDE), keras.layers.Dropout(0.1, seed=0)], False),
+        {"units": 4},
+        {"activation": "tanh"},
+        {"use_bias": False},
+        {"kernel_regularizer": "l2"},
+        {"trainable": False},
     ],
+    ids=str,
 )
-def test_only_wide_and_plain_stacks_are_cut(layers, is_wide):
-    assert is_wide_dense_stack(keras.Sequential([keras.Input((1_200,)), *layers])) == is_wide
+def test_only_wide_and_plain_stacks_are_cut(changed):
+    assert is_wide_dense_stack(wide_stack(activation="relu"))
+    assert not is_wide_dense_stack(wide_stack(**changed))
+    assert not is_wide_dense_stack(wide_stack(keras.layers.Dropout(0.1, seed=0)))
 
 
 # -- Convolution with its maximum ----------------------------------------------------------------
@@ -195,10 +202,9 @@ def test_what_does_not_fire_passes_no_gradient(inputs):
 @pytest.mark.parametrize("rate", [0.3, 0.95])  # at 0.95 some filters lose every frame
 def test_gradients_with_dropped_products(rate):
     rng, seed = RNG(0), tf.constant([3, 4])
-    shapes = [tf.TensorShape((number, 11, 14)) for number in (10, 10, 3)]
     kept = [
-        fast_keras._kept(shape, rate, each)
-        for shape, each in zip(shapes, tf.unstack(tf.random.split(seed, 3)), strict=True)
+        fast_keras._kept(tf.TensorShape((number, 11, 14)), rate, each)
+        for number, each in zip((10, 10, 3), tf.unstack(tf.random.split(seed, 3)), strict=True)
     ]
     kept = tf.concat(kept, axis=0)
     assert np.mean(kept) == pytest.approx(1 - rate, abs=0.05)
@@ -221,8 +227,7 @@ def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
         gan.train_discriminator(rows, of_paper.labels(16, of_paper.REAL))
         assert all((old != new.numpy()).any() for old, new in zip(before, drops, strict=True))
         trained.append([weight.numpy() for weight in gan.discriminator_weights])
-    for one, other in zip(*trained, strict=True):
-        np.testing.assert_array_equal(one, other)
+    assert_alike(*trained)
 
 
 @pytest.mark.parametrize(

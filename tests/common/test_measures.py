@@ -7,7 +7,15 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from enhsim_tf.common import measures
+from enhsim_tf.common.measures import (
+    autocorrelation,
+    effective_rank,
+    lagged_products,
+    marginal_distance,
+    nrmse,
+    roughness,
+    scale_difference,
+)
 from enhsim_tf.common.two_sample import two_sample_auc, window_features
 
 
@@ -23,19 +31,19 @@ def autoregressive(num_windows, samples, coefficient, seed=0):
 
 def test_nrmse_by_hand():
     truth = np.array([[0.0, 2.0], [4.0, 6.0]])  # standard deviation sqrt(5)
-    assert measures.nrmse(truth, truth) == 0
-    assert measures.nrmse(np.full((2, 2), 3.0), truth) == pytest.approx(1)  # the mean
-    assert measures.nrmse(truth + [[1, 1], [-1, -3]], truth) == pytest.approx(np.sqrt(12 / 4 / 5))
+    assert nrmse(truth, truth) == 0
+    assert nrmse(np.full((2, 2), 3.0), truth) == pytest.approx(1)  # the mean
+    assert nrmse(truth + [[1, 1], [-1, -3]], truth) == pytest.approx(np.sqrt(12 / 4 / 5))
     # squares are below what float32 can say
     tiny = np.array([0, 2, 4, 6], np.float32) * np.float32(1e-25)
-    assert measures.nrmse(tiny[::-1].copy(), tiny) == pytest.approx(2)
+    assert nrmse(tiny[::-1].copy(), tiny) == pytest.approx(2)
 
 
 def test_roughness_in_closed_form():
     # a step of a sine of amplitude a and frequency f is a cosine of amplitude 2 a sin(pi f)
     time, amplitude, frequency = np.arange(401), 1.5, 3 / 40
     windows = amplitude * np.sin(2 * np.pi * frequency * time + np.array([[0.0], [1.0], [2.0]]))
-    assert measures.roughness(windows) == pytest.approx(
+    assert roughness(windows) == pytest.approx(
         2 * amplitude * np.sin(np.pi * frequency) / np.sqrt(2)
     )
 
@@ -44,14 +52,14 @@ def test_effective_rank_in_closed_form():
     # energies 9 and 1: shares 0.9 and 0.1; the mean window does not count
     windows = np.array([[3.0, 0], [-3, 0], [0, 1], [0, -1]]) + [5, 7]
     expected = np.exp(-0.9 * np.log(0.9) - 0.1 * np.log(0.1))
-    assert measures.effective_rank(windows) == pytest.approx(expected)
+    assert effective_rank(windows) == pytest.approx(expected)
 
 
 @pytest.mark.filterwarnings("error")
 def test_noise_that_does_not_vary_has_no_warning():
-    assert measures.effective_rank(np.ones((5, 8))) == 1
-    assert measures.scale_difference(np.zeros((5, 8)), normal(5, 8)) == np.inf
-    assert measures.scale_difference(np.zeros((5, 8)), np.ones((5, 8))) == 0
+    assert effective_rank(np.ones((5, 8))) == 1
+    assert scale_difference(np.zeros((5, 8)), normal(5, 8)) == np.inf
+    assert scale_difference(np.zeros((5, 8)), np.ones((5, 8))) == 0
 
 
 @pytest.mark.parametrize(
@@ -62,30 +70,30 @@ def test_noise_that_does_not_vary_has_no_warning():
     ],
 )
 def test_autocorrelation_by_hand(windows, expected):
-    found = measures.autocorrelation(np.array(windows), len(expected) - 1)
+    found = autocorrelation(np.array(windows), len(expected) - 1)
     assert found == pytest.approx(expected)
 
 
 def test_lagged_products_by_hand():
     windows = np.array([[1.0, 2, 4], [-1, -2, -4]]) + 9
-    assert measures.lagged_products(windows, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
+    assert lagged_products(windows, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
 
 
 @pytest.mark.parametrize("factor", [1.1, 2.0])
 def test_scale_difference_is_the_logarithm_of_the_ratio(factor):
     windows = normal(20, 50)
-    assert measures.scale_difference(windows, windows + 9) == pytest.approx(0)
-    assert measures.scale_difference(factor * windows, windows) == pytest.approx(np.log(factor))
-    assert measures.scale_difference(windows, factor * windows) == pytest.approx(np.log(factor))
+    assert scale_difference(windows, windows + 9) == pytest.approx(0)
+    assert scale_difference(factor * windows, windows) == pytest.approx(np.log(factor))
+    assert scale_difference(windows, factor * windows) == pytest.approx(np.log(factor))
 
 
 def test_marginal_distance_of_a_shift_and_by_definition():
     real, other = 2 * normal(60, 500), np.random.default_rng(5).standard_t(5, (60, 500))
     # only the values count, not their order
-    assert measures.marginal_distance(real[::-1, ::-1], real) == 0
-    assert measures.marginal_distance(real + 0.6, real) == pytest.approx(0.6 / np.std(real))
+    assert marginal_distance(real[::-1, ::-1], real) == 0
+    assert marginal_distance(real + 0.6, real) == pytest.approx(0.6 / np.std(real))
     by_definition = scipy.stats.wasserstein_distance(other.ravel(), real.ravel()) / np.std(real)
-    assert measures.marginal_distance(other, real) == pytest.approx(by_definition, rel=0.005)
+    assert marginal_distance(other, real) == pytest.approx(by_definition, rel=0.005)
 
 
 # -- features of windows -------------------------------------------------------------------------

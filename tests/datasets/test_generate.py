@@ -67,11 +67,6 @@ def content_of(folder):
     return {path.name: sha256(path) for path in folder.iterdir()}
 
 
-def copy_of(folder, path):
-    shutil.copytree(folder, path)
-    return path
-
-
 def told(folder, asked):
     """Generates a data set and returns the lines of output."""
     lines = []
@@ -79,10 +74,10 @@ def told(folder, asked):
     return lines
 
 
-def change_manifest(folder, change):
-    manifest = json.loads((folder / "_manifest.json").read_text())
-    change(manifest)
-    (folder / "_manifest.json").write_text(json.dumps(manifest))
+@pytest.fixture
+def copied(undisturbed, tmp_path):
+    """A copy of the undisturbed data set."""
+    return Path(shutil.copytree(undisturbed, tmp_path / "set"))
 
 
 # what is written
@@ -96,38 +91,38 @@ def flip(path):
 
 @pytest.mark.parametrize(("damage", "damaged"), [(None, []), (Path.unlink, [3, 7]), (flip, [3, 7])])
 def test_damaged_and_missing_shards_are_found_and_generated_again(
-    damage, damaged, undisturbed, tmp_path, here
+    damage, damaged, undisturbed, copied, here
 ):
-    folder = copy_of(undisturbed, tmp_path / "set")
     for shard in damaged:
-        damage(folder / shard_file(shard))
-    assert [line.split(":")[0] for line in find_problems(folder)] == list(map(shard_file, damaged))
-    assert told(folder, plan())[0].startswith(f"{20 - len(damaged)} of 20 shards")
+        damage(copied / shard_file(shard))
+    assert [line.split(":")[0] for line in find_problems(copied)] == list(map(shard_file, damaged))
+    assert told(copied, plan())[0].startswith(f"{20 - len(damaged)} of 20 shards")
     assert here == damaged
-    assert content_of(folder) == content_of(undisturbed) and not list(find_problems(folder))
+    assert content_of(copied) == content_of(undisturbed) and not list(find_problems(copied))
 
 
-def begun(folder, undisturbed, done=(0, 1, 2, 5)):
-    """Makes an unfinished data set, as left by a killed run."""
-    change_manifest(copy_of(undisturbed, folder), lambda manifest: manifest.update(shards=None))
-    for shard in set(range(20)) - set(done):
-        (folder / shard_file(shard)).unlink()
-    (folder / f".{shard_file(9)}.0123abcd.enhsim_tf.parquet").write_bytes(b"half")
-    return folder
+@pytest.fixture
+def begun(copied):
+    """An unfinished data set, as left by a killed run."""
+    manifest = json.loads((copied / "_manifest.json").read_text()) | {"shards": None}
+    (copied / "_manifest.json").write_text(json.dumps(manifest))
+    for shard in set(range(20)) - {0, 1, 2, 5}:
+        (copied / shard_file(shard)).unlink()
+    (copied / f".{shard_file(9)}.0123abcd.enhsim_tf.parquet").write_bytes(b"half")
+    return copied
 
 
-def test_a_run_resumes_after_the_finished_shards(undisturbed, tmp_path, here):
-    folder = begun(tmp_path / "set", undisturbed)
-    PlainMaker(plan(seed=4), folder)(1)  # of another plan
-    PlainMaker(plan(130), folder)(2)  # of the same one, but shorter
-    (folder / shard_file(3)).write_bytes((folder / shard_file(5)).read_bytes()[:-9])
-    (folder / shard_file(4)).write_bytes(b"")
-    assert list(find_problems(folder)) == [
+def test_a_run_resumes_after_the_finished_shards(begun, undisturbed, here):
+    PlainMaker(plan(seed=4), begun)(1)  # of another plan
+    PlainMaker(plan(130), begun)(2)  # of the same one, but shorter
+    (begun / shard_file(3)).write_bytes((begun / shard_file(5)).read_bytes()[:-9])
+    (begun / shard_file(4)).write_bytes(b"")
+    assert list(find_problems(begun)) == [
         "not finished: 6 of 20 shards are there; run the same `generate` again"
     ]
-    assert told(folder, plan())[0].startswith("2 of 20 shards")
+    assert told(begun, plan())[0].startswith("2 of 20 shards")
     assert here == [shard for shard in range(20) if shard not in (0, 5)]
-    assert content_of(folder) == content_of(undisturbed)
+    assert content_of(begun) == content_of(undisturbed)
 
 
 def test_a_long_run_says_how_far_it_is(tmp_path, monkeypatch, here):
@@ -140,12 +135,9 @@ def test_a_long_run_says_how_far_it_is(tmp_path, monkeypatch, here):
     "content",
     [b"{", b"[]", b"\xff", b'{"format": "enhsim_tf.datasets.generate/5", "settings": {}}'],
 )
-def test_a_damaged_manifest_gives_one_line_with_advice(
-    content, undisturbed, tmp_path, here, refused
-):
-    folder = copy_of(undisturbed, tmp_path / "set")
-    (folder / "_manifest.json").write_bytes(content)
-    for call in (lambda: generate_data_set(folder, plan()), lambda: list(find_problems(folder))):
+def test_a_damaged_manifest_gives_one_line_with_advice(content, copied, here, refused):
+    (copied / "_manifest.json").write_bytes(content)
+    for call in (lambda: generate_data_set(copied, plan()), lambda: list(find_problems(copied))):
         with refused("_manifest.json", "remove this one"):
             call()
     assert not here
@@ -185,14 +177,11 @@ def test_a_folder_is_held_against_the_same_process_too_and_let_go_of(tmp_path, r
     ],
     ids=itertools.count(),
 )
-def test_a_data_set_with_other_settings_is_left_unchanged(
-    other, words, undisturbed, tmp_path, here, refused
-):
-    folder = begun(tmp_path / "set", undisturbed)
-    before = content_of(folder)
+def test_a_data_set_with_other_settings_is_left_unchanged(other, words, begun, here, refused):
+    before = content_of(begun)
     with refused(words, "--out"):
-        generate_data_set(folder, other)
-    assert content_of(folder) == before and not here
+        generate_data_set(begun, other)
+    assert content_of(begun) == before and not here
 
 
 @pytest.mark.parametrize("name", ["shard-000000.parquet", "folder"])
@@ -203,10 +192,9 @@ def test_a_folder_with_other_content_is_left_unchanged(name, tmp_path, here, ref
     assert [path.name for path in tmp_path.iterdir()] == [name] and not here
 
 
-def test_verify_names_unexpected_files(undisturbed, tmp_path):
-    folder = copy_of(undisturbed, tmp_path / "set")
-    (folder / "shard-000020.parquet").touch()
-    assert list(find_problems(folder)) == ["shard-000020.parquet: not a file of this data set"]
+def test_verify_names_unexpected_files(copied):
+    (copied / "shard-000020.parquet").touch()
+    assert list(find_problems(copied)) == ["shard-000020.parquet: not a file of this data set"]
 
 
 # real faults

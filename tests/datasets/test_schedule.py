@@ -42,16 +42,17 @@ def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
     assert len(set(drifts)) == 4 and 0.3 <= min(drifts) < max(drifts) <= 0.6
     assert schedule[-1].end <= 3_000
     assert all(10 <= event.length <= 80 for event in schedule if event != given)
-    events = [
-        (Degraded(event.kind, event.severity, 0.0), event.begin, event.end) for event in schedule
-    ]
-    drawn = SIMULATOR.alignment.draw_series(3_000, events, np.random.default_rng(0))
+    drawn = SIMULATOR.alignment.draw_series(
+        3_000,
+        [(Degraded(each.kind, each.severity, 0.0), each.begin, each.end) for each in schedule],
+        np.random.default_rng(0),
+    )
     run, nominal = drawn.coarse[0, :, 0], drawn.nominal[0, :, 0]
     for event in schedule:
-        assert (run[event.begin : event.end] != nominal[event.begin : event.end]).any()
-        nominal[event.begin : event.end] = run[event.begin : event.end]
-        if event.kind == "stuck":
-            assert len(set(run[event.begin : event.end])) == 1  # until the end
+        places = slice(event.begin, event.end)
+        assert (run[places] != nominal[places]).any()
+        nominal[places] = run[places]
+        assert event.kind != "stuck" or len(set(run[places])) == 1  # until the end
     np.testing.assert_array_equal(run, nominal)
 
 
@@ -66,11 +67,12 @@ def test_the_same_seed_gives_the_same_schedule_and_changes_that_fade_do_not_meet
 
 
 def test_events_that_change_nothing_or_do_not_fit_are_refused(refused):
+    rng = np.random.default_rng(0)
     with refused("changes nothing at 100 drawn places"):
-        nothing = [ScenarioRange("drift", (0.0, 0.0))]
-        draw_schedule(SIMULATOR, 3_000, [], nothing, 1, (10, 10), np.random.default_rng(0))
+        nothing = ScenarioRange("drift", (0.0, 0.0))
+        draw_schedule(SIMULATOR, 3_000, [], [nothing], 1, (10, 10), rng)
     with refused("space for events"):
-        draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), np.random.default_rng(0))
+        draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), rng)
 
 
 # texts

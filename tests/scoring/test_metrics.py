@@ -11,12 +11,10 @@ from enhsim_tf.scoring.metrics import finite_threshold, recall, threshold
     [
         (98, 0.01, np.inf),
         (99, 0.01, 99),
-        (100, 0.01, 100),
         (199, 0.01, 198),
         (1_000, 0.01, 991),
         (9, 0.5, 5),
         (9, 0.1, 9),
-        (10, 0.1, 10),
         (3, 0.3, 3),
     ],
 )

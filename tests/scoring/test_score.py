@@ -19,13 +19,27 @@ from enhsim_tf.scoring.score import (
 from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.series import Clock, Part
 from tests.fitted_simulators import coarse_run, joint, series
-from tests.known_simulators import of_waves, parts_of
+from tests.known_simulators import of_waves
+
+
+def with_parts(recording, *parts):
+    return dataclasses.replace(recording, parts=parts)
+
+
+def on_clock(recording, interval_s, start):
+    return dataclasses.replace(recording, clock=Clock.of(interval_s, start))
 
 
 def changed(recording, begin, end, by, channel=0):
     values = recording.parts[0].values.copy()
     values[begin:end, channel] += by
-    return dataclasses.replace(recording, parts=(Part(values),))
+    return with_parts(recording, Part(values))
+
+
+def after_gap(recording, begin, offset_s):
+    """A recording of which the samples from one on come later."""
+    values = recording.values
+    return with_parts(recording, Part(values[:begin]), Part(values[begin:], offset_s))
 
 
 @pytest.fixture(scope="module")
@@ -52,28 +66,25 @@ def test_the_past_alone_raises_the_alarm_with_the_sample_that_is_said(single, te
     """With all telemetry until then the first sample is flagged, with a stride less it is not."""
     faulty = changed(telemetry, 1_000, 1_300, 4.0)
     scored = score(single[0], faulty)
-    frame = scored.table
     (event,) = scored.events
-    flagged = int(np.argmax(frame["flag"]))
-    values, scorer = faulty.parts[0].values, scorer_of(single[0])
-    known = scorer.score(values[: event.detected + 1]).samples
+    flagged = int(np.argmax(scored.table["flag"]))
+    known = scorer_of(single[0]).score(faulty.values[: event.detected + 1]).samples
     assert event.detected == flagged + 63 and known[flagged] > 1
     assert (known[:flagged] <= 1).all()
 
 
 def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
-    scored = score(of_run[0], changed(telemetry, 1_000, 1_200, 0.5), coarse_run())
-    frame = scored.table
+    given = changed(telemetry, 1_000, 1_200, 0.5)
+    frame = score(of_run[0], given, coarse_run()).table
     assert {"value", "enhanced", "score", "flag", "out_of_range"} <= set(frame.columns)
     assert frame["score"].iloc[1_020:1_180].min() > 1 and frame["flag"].iloc[:900].mean() < 0.05
-    clean = changed(telemetry, 1_000, 1_200, 0.5).parts[0].values[:, 0] - frame["value"]
-    assert not clean.any() and np.std(frame["value"] - frame["enhanced"]) < 0.25
+    np.testing.assert_array_equal(frame["value"], given.values[:, 0])
+    assert np.std(frame["value"] - frame["enhanced"]) < 0.25
 
 
 def test_an_event_ends_where_the_run_has_a_gap(of_run, telemetry):
-    whole = coarse_run()
-    values = whole.parts[0].values
-    run = dataclasses.replace(whole, parts=(Part(values[:1_500]), Part(values[1_600:], 16_000.0)))
+    values = coarse_run().values
+    run = with_parts(coarse_run(), Part(values[:1_500]), Part(values[1_600:], 16_000.0))
     scored = score(of_run[0], changed(telemetry, 1_300, 3_000, 0.5), run)
     before = next(event for event in scored.events if abs(event.begin - 1_300) <= 8)
     after = scored.events[scored.events.index(before) + 1]
@@ -84,63 +95,56 @@ def test_an_event_ends_where_the_run_has_a_gap(of_run, telemetry):
 
 
 def test_no_event_has_its_peak_before_it_begins(of_run, telemetry):
-    options = ScoreOptions(false_alarm_rate=0.2)
-    events = score(of_run[0], telemetry, coarse_run(), options).events
+    events = score(of_run[0], telemetry, coarse_run(), ScoreOptions(0.2)).events
     assert events and all(one.begin <= one.peak < one.end for one in events)
 
 
 def test_samples_without_a_run_get_no_score(of_run, telemetry):
-    scored = score(of_run[0], telemetry, coarse_run(2_000))
-    frame = scored.table
+    frame = score(of_run[0], telemetry, coarse_run(2_000)).table
     assert frame["score"].isna().sum() == 1_000 and not frame["flag"].iloc[2_000:].any()
-    late = dataclasses.replace(telemetry, parts=(Part(telemetry.parts[0].values[500:], 5_000.0),))
-    scored = score(of_run[0], late, coarse_run(2_000))
-    frame = scored.table
-    assert (
-        frame["score"].isna().tolist() == [False] * 1_500 + [True] * 1_000
-        and frame["flag"].mean() < 0.05
-    )
+    late = with_parts(telemetry, Part(telemetry.values[500:], 5_000.0))
+    frame = score(of_run[0], late, coarse_run(2_000)).table
+    assert frame["score"].isna().tolist() == [False] * 1_500 + [True] * 1_000
+    assert frame["flag"].mean() < 0.05
+
+
+def row_of_event(clock, times, *places):
+    """The row of an event in samples at these times."""
+    event = Event(*places, 2.0, 0.9, "learnt", ("step", "level"), ("volts",))
+    scored = ScoredTelemetry(pd.DataFrame(index=times), {}, (event,), 16, clock)
+    return events_table(scored).iloc[0]
 
 
 def test_an_event_across_a_gap_ends_one_interval_after_its_last_sample():
-    seconds = np.array([0, 10, 20, 500, 510])
-    frame = pd.DataFrame(index=pd.to_datetime(seconds, unit="s", utc=True))
-    event = Event(1, 5, 2, 3, 4, 2.0, 0.9, "learnt", ("step", "level"), ("volts",))
-    scored = ScoredTelemetry(frame, {}, (event,), 16, Clock.of(10.0, "2024-01-01"))
-    table = events_table(scored)
-    times = table[["begin", "end", "detected", "peak"]].iloc[0]
-    assert [time.timestamp() for time in times] == [10, 520, 20, 500]
-    assert (table["views"][0], table["channels"][0]) == ("step, level", "volts")
+    times = pd.to_datetime([0, 10, 20, 500, 510], unit="s", utc=True)
+    row = row_of_event(Clock.of(10.0, "2024-01-01"), times, 1, 5, 2, 3, 4)
+    found = [row[name].timestamp() for name in ("begin", "end", "detected", "peak")]
+    assert found == [10, 520, 20, 500]
+    assert (row["views"], row["channels"]) == ("step, level", "volts")
 
 
 def test_an_event_of_a_fast_clock_ends_one_interval_after_its_last_sample():
     clock = Clock.of(2e-7, "2024-01-01")
-    frame = pd.DataFrame(index=clock.index(2e-7 * np.arange(5)))
-    event = Event(1, 3, 2, 2, 2, 2.0, 0.9, "learnt", ("level",), ("volts",))
-    table = events_table(ScoredTelemetry(frame, {}, (event,), 16, clock))
-    assert table["end"][0] == frame.index[3]
+    times = clock.index(2e-7 * np.arange(5))
+    assert row_of_event(clock, times, 1, 3, 2, 2, 2)["end"] == times[3]
 
 
 def test_times_of_a_clock_from_zero_are_written_as_seconds(single, telemetry, tmp_path):
-    values = changed(telemetry, 1_500, 3_000, 6.0)
-    scored = score(single[0], dataclasses.replace(values, clock=Clock.of(10.0, "1970-01-01")))
+    given = on_clock(changed(telemetry, 1_500, 3_000, 6.0), 10.0, "1970-01-01")
+    scored = score(single[0], given)
     write_scores(tmp_path / "scores.CSV", scored)
-    written, events = (
-        pd.read_csv(tmp_path / "scores.CSV"),
-        pd.read_csv(tmp_path / "scores.events.csv"),
-    )
+    written = pd.read_csv(tmp_path / "scores.CSV")
     assert written["time"].tolist() == [10.0 * number for number in range(3_000)]
-    event = scored.events[-1]
-    assert [10 * event.begin, 30_000] in events[["begin", "end"]].to_numpy().tolist() and len(
-        events
-    ) == len(scored.events)
-    assert f"since {10 * event.begin} s" in scored.departure
+    events = pd.read_csv(tmp_path / "scores.events.csv")[["begin", "end"]].to_numpy().tolist()
+    begin_s = 10 * scored.events[-1].begin
+    assert [begin_s, 30_000] in events and len(events) == len(scored.events)
+    assert f"since {begin_s} s" in scored.departure
 
 
 def test_a_lasting_change_is_one_event_since_its_time_and_names_update(single, telemetry):
-    values = changed(telemetry, 1_500, 3_000, 6.0).parts[0].values
-    parts = Part(values[:1_200]), Part(values[1_200:], 13_000.0)  # after a gap of a hundred samples
-    scored = score(single[0], dataclasses.replace(telemetry, parts=parts))
+    # after a gap of a hundred samples
+    given = after_gap(changed(telemetry, 1_500, 3_000, 6.0), 1_200, 13_000.0)
+    scored = score(single[0], given)
     frame = scored.table
     (event,) = scored.events
     assert abs(event.begin - 1_500) <= 8 and event.end == 3_000
@@ -164,46 +168,35 @@ def test_a_fault_within_a_departure_is_an_event_against_the_new_operating_point(
 
 def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, telemetry):
     # begins 500 samples later
-    run = dataclasses.replace(
-        coarse_run(), parts=(Part(coarse_run().parts[0].values[500:], 5_000.0),)
-    )
+    run = with_parts(coarse_run(), Part(coarse_run().values[500:], 5_000.0))
     scored = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), run)
-    frame = scored.table
-    *_, event = scored.events
+    event = scored.events[-1]
     assert "level" in scored.departure and abs(event.begin - 1_500) <= 8
-    assert event.end == 3_000 and frame["score"].iloc[:500].isna().all()
+    assert event.end == 3_000 and scored.table["score"].iloc[:500].isna().all()
 
 
 def test_a_channel_that_is_missing_leaves_the_others_judged(both):
-    values = changed(joint(seed=1), 1_000, 1_200, -60.0, channel=1).parts[0].values
-    watts = parts_of((Part(values[:, 1:]),), ("watts",), 10.0, joint().start, "watts")
+    watts = changed(joint(seed=1), 1_000, 1_200, -60.0, channel=1).select(["watts"])
     scored = score(both[0], watts)
-    frame = scored.table
     (event,) = scored.events
     assert scored.not_judged == ("volts",) and event.channels == ("watts",)
-    assert list(frame.columns) == ["watts", "score", "flag"] and abs(event.begin - 1_000) <= 8
-    alone = scorer_of(both[0], channels=("watts",)).score(values[:, 1:]).samples
-    np.testing.assert_array_equal(frame["score"], alone)
+    assert list(scored.table) == ["watts", "score", "flag"] and abs(event.begin - 1_000) <= 8
+    alone = scorer_of(both[0], channels=("watts",)).score(watts.values).samples
+    np.testing.assert_array_equal(scored.table["score"], alone)
 
 
-def test_the_channel_that_fails_is_named(both):
-    for channel, by in ((0, 4.0), (1, -60.0)):
-        scored = score(both[0], changed(joint(seed=1), 1_000, 1_200, by, channel))
-        (event,) = scored.events
-        assert event.channels[0] == ("volts", "watts")[channel]
+@pytest.mark.parametrize(("channel", "by"), [(0, 4.0), (1, -60.0)])
+def test_the_channel_that_fails_is_named(both, channel, by):
+    (event,) = score(both[0], changed(joint(seed=1), 1_000, 1_200, by, channel)).events
+    assert event.channels[0] == ("volts", "watts")[channel]
 
 
 def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
     # within a thousandth
-    single[0].pair(dataclasses.replace(telemetry, clock=Clock.of(10.005, telemetry.start)))
-    short = dataclasses.replace(telemetry, parts=(Part(telemetry.parts[0].values[:63]),))
+    single[0].pair(on_clock(telemetry, 10.005, telemetry.start))
     for words, (simulator, _), given in (
-        (
-            "sample every 10 s",
-            single,
-            dataclasses.replace(telemetry, clock=Clock.of(1.0, telemetry.start)),
-        ),
-        ("at least one window of 80", single, short),
+        ("sample every 10 s", single, on_clock(telemetry, 1.0, telemetry.start)),
+        ("at least one window of 80", single, with_parts(telemetry, Part(telemetry.values[:63]))),
         ("channels volts, watts", both, dataclasses.replace(joint(), columns=("volts", "amps"))),
         ("--coarse", of_run, telemetry),
     ):
@@ -229,9 +222,8 @@ def test_an_event_at_the_beginning_of_a_part_is_not_detected_before_it_begins(si
 
 
 def test_a_fault_that_goes_on_after_a_gap_is_an_event_of_both_parts(single, telemetry):
-    values = changed(telemetry, 1_000, 2_000, 6.0).parts[0].values
-    parts = Part(values[:1_200]), Part(values[1_200:], 20_000.0)
-    before, after, *_ = score(single[0], dataclasses.replace(telemetry, parts=parts)).events
+    given = after_gap(changed(telemetry, 1_000, 2_000, 6.0), 1_200, 20_000.0)
+    before, after, *_ = score(single[0], given).events
     assert abs(before.begin - 1_000) <= 8 and before.end == after.begin == 1_200
 
 
@@ -247,7 +239,7 @@ def test_channels_keep_their_values_whatever_their_names(both):
     renamed.channels = names
     scored = score(renamed, dataclasses.replace(joint(seed=1), columns=names))
     values = scored.table[[scored.columns[name] for name in names]]
-    np.testing.assert_array_equal(values, joint(seed=1).parts[0].values)
+    np.testing.assert_array_equal(values, joint(seed=1).values)
     assert list(scored.table)[2:] == ["score", "flag"]
 
 

@@ -21,6 +21,11 @@ NOMINAL = (
 ).astype(np.float32)
 
 
+def windows_of(*rows):
+    """Windows of one channel."""
+    return np.array(rows, np.float32)[:, :, None]
+
+
 def check_view(make):
     """The contract of every view."""
     before = NOMINAL.copy()
@@ -51,17 +56,16 @@ def test_windows_that_never_vary_have_score_zero_and_any_others_more(name):
 
 
 def test_a_shape_is_the_distance_to_the_nearest_one_whatever_the_level():
-    learnt = np.array([[0, 1, 0, 1], [0, 0, 2, 2]], np.float32)[:, :, None]
-    view = Shape().fit(learnt)
-    windows = np.array([[7, 8, 7, 8], [0, 0, 2, 3]], np.float32)[:, :, None]
+    view = Shape().fit(windows_of([0, 1, 0, 1], [0, 0, 2, 2]))
+    windows = windows_of([7, 8, 7, 8], [0, 0, 2, 3])
     # (-1, -1, 1, 1) and (-1.25, -1.25, .75, 1.75)
     np.testing.assert_allclose(view.score(windows), [0.0, np.sqrt(0.75)], atol=1e-6)
 
 
 def test_a_subspace_is_left_by_what_is_orthogonal_to_it():
-    line = np.linspace(-1, 1, 21)[:, None] * np.array([3.0, 0.0, 4.0, 0.0])
-    view = Subspace().fit(line[:, :, None].astype(np.float32))
-    windows = np.array([[30, 0, 40, 0], [4, 0, -3, 0], [3, 1, 4, 0]], np.float32)[:, :, None]
+    line = np.linspace(-1, 1, 21)[:, None] * [3.0, 0.0, 4.0, 0.0]
+    view = Subspace().fit(windows_of(*line))
+    windows = windows_of([30, 0, 40, 0], [4, 0, -3, 0], [3, 1, 4, 0])
     np.testing.assert_allclose(view.score(windows), [0.0, 5.0, 1.0], atol=1e-4)
 
 
@@ -76,7 +80,7 @@ def test_a_level_is_counted_in_standard_deviations_of_the_means_along_their_rela
 
 
 def test_a_spread_is_a_logarithm_and_a_step_is_in_units_of_the_largest_nominal_one():
-    wave = np.tile(np.array([1.0, -1.0], np.float32), 8)[None, :, None]
+    wave = windows_of([1.0, -1.0] * 8)
     view = Spread().fit(np.concatenate([wave, wave, 2 * wave]))
     np.testing.assert_allclose(view.score(wave * np.e**2), 2.0, rtol=1e-5)
     np.testing.assert_allclose(Step().fit(wave).score(np.concatenate([wave, 3 * wave])), [1, 3])

@@ -11,8 +11,7 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
 from tests.telemetry.robot import follow, in_folder
-from tests.telemetry.test_forms import ASKED
-from tests.telemetry.test_forms import REFUSED as OWN
+from tests.telemetry.test_forms import REFUSED
 
 SHARED = Path(__file__).parents[3] / "shared"
 CASES = [
@@ -75,10 +74,9 @@ def test_the_advice_leads_to_the_right_telemetry_or_says_why_not(path, line):
         assert any(is_right(ending, RIGHT[name]) for ending in endings), endings
 
 
-@pytest.mark.parametrize("form", [*ASKED, *OWN])
-def test_the_advice_for_a_form_of_our_own_ends(tmp_path, form):
-    (tmp_path / "a.csv").write_text((ASKED | OWN)[form][0])
-    endings = follow([shlex.quote(str(tmp_path / "a.csv"))])
+@pytest.mark.parametrize("form", REFUSED)
+def test_the_advice_for_a_form_of_our_own_ends(written, form):
+    endings = follow([shlex.quote(str(written(REFUSED[form][0])))])
     assert any(ending.channels for ending in endings) or all(
         ending.message.rpartition(". ")[2].split()[0] in ADVICE for ending in endings
     ), endings
@@ -87,12 +85,13 @@ def test_the_advice_for_a_form_of_our_own_ends(tmp_path, form):
 ADVICE = "Give Write Rename Read Correct Name Add Convert Choose Save Complete".split()
 
 
-def test_no_value_is_put_in_the_wrong_place(tmp_path):
+ROWS = [f"{number},{number + 0.5},{number + 0.25}" for number in range(50)]
+
+
+def test_no_value_is_put_in_the_wrong_place(written):
     """Lines with fewer cells: left out on request, with the values of all others where they are."""
-    rows = [f"{number},{number + 0.5},{number + 0.25}" for number in range(50)]
-    rows[20] = "20,93426"
-    (tmp_path / "a.csv").write_text("\n".join(["time,a,b", *rows]) + "\n")
-    (ending,) = follow([str(tmp_path / "a.csv")])
+    rows = [*ROWS[:20], "20,93426", *ROWS[21:]]
+    (ending,) = follow([str(written("\n".join(["time,a,b", *rows]) + "\n"))])
     assert ending.options == ("--drop-bad",)
     for name, off in (("a", 0.5), ("b", 0.25)):
         values = ending.channels[name].telemetry.values[:, 0]
@@ -101,9 +100,7 @@ def test_no_value_is_put_in_the_wrong_place(tmp_path):
 
 
 @pytest.mark.parametrize("end", ["\n", ""])
-def test_a_quote_that_does_not_end_hides_no_lines(tmp_path, end):
-    rows = [f"{number},{number + 0.5},{number + 0.25}" for number in range(50)]
-    rows[20] = '"' + rows[20]
-    (tmp_path / "a.csv").write_text("\n".join(["time,a,b", *rows]) + end)
+def test_a_quote_that_does_not_end_hides_no_lines(written, end):
+    rows = [*ROWS[:20], '"' + ROWS[20], *ROWS[21:]]
     with pytest.raises(InputError, match="line 22 has 1"):
-        read_source(tmp_path / "a.csv")
+        read_source(written("\n".join(["time,a,b", *rows]) + end))

@@ -2,6 +2,7 @@
 any work.
 """
 
+import http.server
 import subprocess
 import sys
 import threading
@@ -113,48 +114,50 @@ def test_series_that_influxdb_cannot_store_are_refused(pretended, refused):
             InfluxStore(f"influxdb://b/{place}").write(*POINTS)
 
 
-def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refused):
-    import http.server
+@pytest.fixture
+def served(pretended, monkeypatch):
+    """`served(answer)` starts a server that answers every request to write or to read by the status
+    and the content of `answer(path)`.
+    """
+    servers = []
 
-    answers = []
+    def served(answer):
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def log_message(self, *words):
+                pass
 
-    class Silent(http.server.SimpleHTTPRequestHandler):
-        def log_message(self, *words):
-            pass
+            def do_POST(self):  # noqa: N802
+                self.rfile.read(int(self.headers["Content-Length"]))
+                status, content = answer(self.path.partition("?")[0])
+                self.send_response(status)
+                self.send_header("Content-Length", str(len(content)))
+                self.end_headers()
+                self.wfile.write(content)
 
-        def do_POST(self):  # noqa: N802
-            self.send_response(answers[-1])
-            self.end_headers()
-            self.wfile.write(b"<html><body>Welcome,\nfriend</body></html>")
+        server = http.server.HTTPServer(("127.0.0.1", 0), Handler)
+        servers.append(server)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{server.server_port}")
 
-    with http.server.HTTPServer(("127.0.0.1", 0), Silent) as other:
-        threading.Thread(target=other.serve_forever, daemon=True).start()
-        monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{other.server_port}")
-        for status, words in ((200, "something else"), (404, "something else"), (302, "(302)")):
-            answers.append(status)
-            with refused(words):
-                InfluxStore("influxdb://b/m/f").check()
-        other.shutdown()
+    yield served
+    for server in servers:
+        server.shutdown()
+        server.server_close()
 
 
-def test_a_write_has_one_client_which_is_closed(pretended, monkeypatch):
-    import http.server
+@pytest.mark.parametrize(
+    ("status", "words"), [(200, "something else"), (404, "something else"), (302, "(302)")]
+)
+def test_another_service_at_the_address_is_reported(served, refused, status, words):
+    served(lambda path: (status, b"<html><body>Welcome,\nfriend</body></html>"))
+    with refused(words):
+        InfluxStore("influxdb://b/m/f").check()
 
+
+def test_a_write_has_one_client_which_is_closed(served, monkeypatch):
     from influxdb_client import InfluxDBClient
 
     paths, clients, closed = [], [], []
-
-    class Empty(http.server.BaseHTTPRequestHandler):
-        def log_message(self, *words):
-            pass
-
-        def do_POST(self):  # noqa: N802
-            self.rfile.read(int(self.headers["Content-Length"]))
-            paths.append(self.path.partition("?")[0])
-            self.send_response(200 if "query" in self.path else 204)
-            self.send_header("Content-Length", "0")
-            self.end_headers()
-
     opened = InfluxDBClient.__init__
     close = InfluxDBClient.close
     monkeypatch.setattr(
@@ -163,11 +166,8 @@ def test_a_write_has_one_client_which_is_closed(pretended, monkeypatch):
         lambda self, *given, **more: clients.append(self) or opened(self, *given, **more),
     )
     monkeypatch.setattr(InfluxDBClient, "close", lambda self: closed.append(self) or close(self))
-    with http.server.HTTPServer(("127.0.0.1", 0), Empty) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{server.server_port}")
-        InfluxStore("influxdb://b/m/f").write(np.arange(6_000), np.ones(6_000, np.float32))
-        server.shutdown()
+    served(lambda path: paths.append(path) or (200 if "query" in path else 204, b""))
+    InfluxStore("influxdb://b/m/f").write(np.arange(6_000), np.ones(6_000, np.float32))
     assert paths == ["/api/v2/query", "/api/v2/write", "/api/v2/write"]
     assert len(clients) == 1 and closed == clients
 
@@ -186,15 +186,9 @@ def test_an_unusable_store_is_reported_before_any_work(
 ):
     if word == "INFLUXDB_V2_TOKEN":
         monkeypatch.delenv(word)
-    words = [
-        *options,
-        "--budget",
-        "smoke",
-        "--out",
-        str(tmp_path / "out"),
-        "--cache",
-        str(tmp_path / "cache"),
-    ]
+    words = [*options, "--budget", "smoke"]
+    for folder in ("out", "cache"):
+        words += [f"--{folder}", str(tmp_path / folder)]
     program = f"""
 import sys
 from enhsim_tf.reproduce import main
@@ -205,9 +199,6 @@ print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} 
         [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60
     )
     assert done.stdout == "2 []\n", done.stderr
-    assert (
-        len(done.stderr.splitlines()) == 1
-        and done.stderr.startswith("error: Expected ")
-        and word in done.stderr
-    )
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith("error: Expected ") and word in done.stderr
     assert not list(tmp_path.iterdir())

@@ -22,10 +22,8 @@ def test_the_levels_of_quantised_values_are_found(step):
 
 def test_values_off_the_grid_by_a_rounding_error_are_the_same_level():
     rng = np.random.default_rng(0)
-    grid, signal = (
-        0.05 * rng.integers(-10, 11, (50, 200)),
-        rng.uniform(-1, 1, (50, 200)).astype(np.float32),
-    )
+    grid = 0.05 * rng.integers(-10, 11, (50, 200))
+    signal = rng.uniform(-1, 1, (50, 200)).astype(np.float32)
     values = (grid + signal).astype(np.float32) - signal
     assert len(np.unique(values)) > 2 * 21
     found = Levels.find(values)
@@ -33,22 +31,22 @@ def test_values_off_the_grid_by_a_rounding_error_are_the_same_level():
     np.testing.assert_allclose(found.round(values), grid, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        np.random.default_rng(0).standard_normal(5_000),
-        # values of a noise-free wave repeat too
-        np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),
-        np.clip(np.random.default_rng(0).standard_normal(5_000), -1, 1),  # a saturated sensor
-        np.arange(20.0),
-        np.random.default_rng(0).choice([0.0, 1.0, 1.7], 500),
-        # so dense that most neighbours differ by less than a millionth
-        np.random.default_rng(0).uniform(0, 1, 2_000_000),
-    ],
-    ids=["noise", "wave", "clipped", "short", "uneven", "dense"],
-)
-def test_values_that_are_not_quantised_have_no_levels(values):
-    assert Levels.find(values.astype(np.float32)) is None
+NOISE = np.random.default_rng(0).standard_normal(5_000)
+NO_LEVELS = {
+    "noise": NOISE,
+    # values of a noise-free wave repeat too
+    "wave": np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),
+    "a saturated sensor": np.clip(NOISE, -1, 1),
+    "short": np.arange(20.0),
+    "uneven": np.random.default_rng(0).choice([0.0, 1.0, 1.7], 500),
+    # so dense that most neighbours differ by less than a millionth
+    "dense": np.random.default_rng(0).uniform(0, 1, 2_000_000),
+}
+
+
+@pytest.mark.parametrize("name", NO_LEVELS)
+def test_values_that_are_not_quantised_have_no_levels(name):
+    assert Levels.find(NO_LEVELS[name].astype(np.float32)) is None
 
 
 def test_values_are_rounded_to_the_nearest_level():

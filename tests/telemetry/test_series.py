@@ -8,8 +8,8 @@ from enhsim_tf.telemetry.series import Telemetry, check_values
 RAMP = np.arange(12.0)
 
 
-def with_one(bad, values=RAMP):
-    values = values.copy()
+def with_one(bad):
+    values = RAMP.copy()
     values[4] = bad
     return values
 

@@ -42,144 +42,146 @@ def test_csv_of_other_encodings(tmp_path, encoding):
     assert (cleaned.report.find("encoding") is not None) == (encoding == "latin-1")
 
 
-def test_columns_by_name_and_all_of_numbers(tmp_path):
-    TABLE.to_csv(tmp_path / "a.csv", index=False)
-    TABLE.to_parquet(tmp_path / "a.parquet")
-    TABLE.set_index("utc").to_parquet(tmp_path / "b.parquet")
-    for file in ("a.csv", "a.parquet", "b.parquet"):
-        channels = read_source(tmp_path / file)
-        assert list(channels) == ["volts", "amps"]
-        cleaned = check(channels["volts"])
-        check(channels["amps"], "amps", 2 * VALUES)
-        kinds = [finding.kind for finding in cleaned.report.findings]
-        assert (
-            kinds == ["clock", "columns left out"]
-            and "mode" in cleaned.report.find("columns left out").text
-        )
-        named = read_source(str(tmp_path / file), columns=["amps"], time="utc")
-        assert list(named) == ["amps"] and [
-            finding.kind for finding in clean(named["amps"]).report.findings
-        ] == ["clock"]
-        counted = read_source(tmp_path / file, columns="amps", time="none")["amps"]
-        assert counted.times is None and clean(counted).parts[0].start is None
+WRITERS = {
+    "a.csv": lambda path: TABLE.to_csv(path, index=False),
+    "a.parquet": TABLE.to_parquet,
+    "an_index.parquet": TABLE.set_index("utc").to_parquet,
+}
 
 
-def test_channels_without_time(tmp_path):
-    array = np.stack([VALUES, 3 * VALUES], axis=1)
-    np.save(tmp_path / "wheel.npy", array)
-    np.save(tmp_path / "one.npy", VALUES)
-    np.save(tmp_path / "column.npy", VALUES[:, None])
-    assert list(read_source(tmp_path / "wheel.npy")) == ["wheel.0", "wheel.1"]
-    (channel,) = read_source(tmp_path / "wheel.npy", columns=[1]).values()
+@pytest.mark.parametrize("file", WRITERS)
+def test_columns_by_name_and_all_of_numbers(tmp_path, file):
+    WRITERS[file](path := tmp_path / file)
+    channels = read_source(path)
+    assert list(channels) == ["volts", "amps"]
+    report = check(channels["volts"]).report
+    check(channels["amps"], "amps", 2 * VALUES)
+    assert kinds_of(report) == ["clock", "columns left out"]
+    assert "mode" in report.find("columns left out").text
+    named = read_source(str(path), columns=["amps"], time="utc")
+    assert list(named) == ["amps"] and kinds_of(clean(named["amps"]).report) == ["clock"]
+    counted = read_source(path, columns="amps", time="none")["amps"]
+    assert counted.times is None and clean(counted).parts[0].start is None
+
+
+def kinds_of(report):
+    return [finding.kind for finding in report.findings]
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """`saved(array)` writes an array and returns its path."""
+
+    def saved(array, name="a.npy"):
+        np.save(tmp_path / name, array)
+        return tmp_path / name
+
+    return saved
+
+
+def test_channels_without_time(saved):
+    path = saved(np.column_stack([VALUES, 3 * VALUES]), "wheel.npy")
+    assert list(read_source(path)) == ["wheel.0", "wheel.1"]
+    (channel,) = read_source(path, columns=[1]).values()
     assert (channel.name, channel.cells.tolist()) == ("wheel.1", (3 * VALUES).tolist())
     assert channel.times is None
-    for name in ("one", "column"):
-        assert read_source(tmp_path / f"{name}.npy")[name].cells.tolist() == VALUES.tolist()
-    (tmp_path / "a.csv").write_text("a,b\n1,2\n2,5\n\n4,\n")
-    channels = read_source(tmp_path / "a.csv")
-    assert channels["a"].cells.isna().tolist() == [False, False, True, False], (
-        "a blank line is a row"
-    )
+    for array in (VALUES, VALUES[:, None]):
+        assert read_source(saved(array))["a"].cells.tolist() == VALUES.tolist()
+
+
+def test_a_blank_line_is_a_row(written):
+    channels = read_source(written("a,b\n1,2\n2,5\n\n4,\n"))
+    assert channels["a"].cells.isna().tolist() == [False, False, True, False]
     assert clean(channels["b"]).report.find("missing values").count == 2
 
 
-def test_a_packed_array_is_read(tmp_path):
-    np.save(tmp_path / "a.npy", VALUES)
-    (tmp_path / "a.npy.gz").write_bytes(gzip.compress((tmp_path / "a.npy").read_bytes()))
-    assert read_source(tmp_path / "a.npy.gz")["a"].cells.tolist() == VALUES.tolist()
+def test_a_packed_array_is_read(saved, tmp_path):
+    (tmp_path / "b.npy.gz").write_bytes(gzip.compress(saved(VALUES).read_bytes()))
+    assert read_source(tmp_path / "b.npy.gz")["b"].cells.tolist() == VALUES.tolist()
 
 
-def test_columns_of_an_array_are_named_as_their_channels(tmp_path, refused):
-    np.save(tmp_path / "a.npy", np.column_stack([VALUES, np.full(N, np.nan), VALUES]))
+def test_columns_of_an_array_are_named_as_their_channels(saved, refused):
+    path = saved(np.column_stack([VALUES, np.full(N, np.nan), VALUES]))
     with refused("--column a.0 --column a.2"):
-        read_telemetry(tmp_path / "a.npy")
-    (telemetry,) = read_telemetry(tmp_path / "a.npy", columns=["a.0", "a.2"])
+        read_telemetry(path)
+    (telemetry,) = read_telemetry(path, columns=["a.0", "a.2"])
     assert telemetry.columns == ("a.0", "a.2")
 
 
-def test_commands_are_no_channels_unless_they_are_named(tmp_path):
+def test_commands_are_no_channels_unless_they_are_named(saved):
     # one command after the other
     sent = (np.arange(24) == np.arange(N)[:, None] % 24).astype(float)
-    np.save(tmp_path / "a.npy", np.column_stack([VALUES, sent]))
-    assert list(read_source(tmp_path / "a.npy")) == ["a.0"]
-    assert list(read_source(tmp_path / "a.npy", ["0", "3"])) == ["a.0", "a.3"]
-    np.save(tmp_path / "c.npy", np.column_stack([np.arange(len(VALUES)), VALUES]))
-    with pytest.raises(InputError, match="--column 1, or --time none"):
-        read_source(tmp_path / "c.npy")
-    assert list(read_source(tmp_path / "c.npy", time="none")) == ["c.0", "c.1"]
-    np.save(tmp_path / "b.npy", np.column_stack([VALUES, 2 * sent]))
-    assert len(read_source(tmp_path / "b.npy")) == 25
+    path = saved(np.column_stack([VALUES, sent]))
+    assert list(read_source(path)) == ["a.0"]
+    assert list(read_source(path, ["0", "3"])) == ["a.0", "a.3"]
+    assert len(read_source(saved(np.column_stack([VALUES, 2 * sent])))) == 25
 
 
-def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
+def test_a_column_that_counts_may_be_the_clock_of_an_array(saved, refused):
+    path = saved(np.column_stack([np.arange(N), VALUES]))
+    with refused("--column 1, or --time none"):
+        read_source(path)
+    assert list(read_source(path, time="none")) == ["a.0", "a.1"]
+
+
+def test_every_row_of_a_dirty_table_is_accounted_for(written):
     """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a
     killed recorder.
     """
     rows = ["{}:00,1", ",2", "{}:01,3", "boot,4", "{}:01,3", "{}:02,5", "{}:03"]
-    (tmp_path / "a.csv").write_text(
-        "\n".join(["time,volts", *rows]).replace("{}", "2020-03-01T00:00")
-    )
-    channel = read_source(tmp_path / "a.csv", options=Cleaning(drop_bad=True))["volts"]
-    report = clean(channel).report
+    path = written("\n".join(["time,volts", *rows]).replace("{}", "2020-03-01T00:00"))
+    report = clean(read_source(path, options=Cleaning(drop_bad=True))["volts"]).report
     assert (report.rows_in, report.rows_used, report.rows_left_out, report.samples) == (6, 3, 3, 3)
-    found = {finding.kind: finding.count for finding in report.findings}
-    assert found == {
-        "clock": 1,
-        "bad times": 1,
-        "missing times": 1,
-        "duplicate rows": 1,
-        "ragged lines": 1,
-    }
+    assert {finding.kind: finding.count for finding in report.findings} == dict.fromkeys(
+        ["clock", "bad times", "missing times", "duplicate rows", "ragged lines"], 1
+    )
 
 
-BAD = {
-    "not there": ("absent.csv", None, {}, "does not exist"),
-    "a name no file can have": ("x" * 300 + ".csv", None, {}, "does not exist"),
-    "a folder without tables": (".", None, {}, "without any"),
-    "unknown kind": ("a.xlsx", b"x", {}, "a.xlsx"),
-    "empty": ("a.csv", b"", {}, "empty"),
-    "comments only": ("a.csv", b"# a\n# b\n", {}, "a.csv"),
-    "bytes": ("a.csv", bytes(range(256)) * 20, {}, "not text"),
-    "no header": ("a.csv", b"1,2\n3,4\n5,6\n", {}, "1, 2"),
-    "lines longer than the header": ("a.csv", b"a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
+# case: bytes of a table, words of the message, arguments
+BAD_TABLES = {
+    "empty": (b"", "empty"),
+    "comments only": (b"# a\n# b\n", "a.csv"),
+    "bytes": (bytes(range(256)) * 20, "not text"),
+    "no header": (b"1,2\n3,4\n5,6\n", "1, 2"),
+    "lines longer than the header": (b"a,b\n1,2,3\n4,5,6\n", "a.csv"),
     "one name for two columns, named": (
-        "a.csv",
         b"a,a,b\n1,2,3\n3,4,5\n",
-        {"columns": ["a"]},
         "a.1, a.2, b",
+        {"columns": ["a"]},
     ),
-    "no such column": ("a.csv", b"a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
+    "no such column": (b"a,b\n1,2\n", "'c'", {"columns": ["c"]}),
     "two time columns": (
-        "a.csv",
         b"start,planned,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n",
-        {},
         "start, planned",
     ),
-    "words only": ("a.csv", b"a,b\nx,y\nz,w\n", {}, "none in a.csv"),
-    "no columns named": ("a.csv", b"a,b\n1,2\n", {"columns": []}, "columns=[]"),
-    "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
+    "words only": (b"a,b\nx,y\nz,w\n", "none in a.csv"),
+    "no columns named": (b"a,b\n1,2\n", "columns=[]", {"columns": []}),
+}
+# case: name and content of the file, words of the message, arguments
+BAD = {
+    "not there": ("absent.csv", None, "does not exist"),
+    "a name no file can have": ("x" * 300 + ".csv", None, "does not exist"),
+    "a folder without tables": (".", None, "without any"),
     "windows": (
         "a.parquet",
         pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}),
-        {},
         "left out: window ([1. 2.])",
     ),
     "two levels of names": (
         "a.parquet",
         pd.DataFrame([[1.0]], columns=pd.MultiIndex.from_tuples([("a", "x")])),
-        {},
         "2 levels",
     ),
-    "no array": ("a.npy", b"not an array", {}, "a.npy"),
-    "a column number too large": ("a.npy", np.zeros((3, 2)), {"columns": ["2"]}, "'2'"),
-    "a time of an array": ("a.npy", np.zeros(3), {"time": "t"}, "'t'"),
-}
+    "no array": ("a.npy", b"not an array", "a.npy"),
+    "a column number too large": ("a.npy", np.zeros((3, 2)), "'2'", {"columns": ["2"]}),
+    "a time of an array": ("a.npy", np.zeros(3), "'t'", {"time": "t"}),
+} | {case: ("a.csv", *others) for case, others in BAD_TABLES.items()}
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("case", BAD)
 def test_bad_sources_are_refused(tmp_path, refused, case):
-    name, content, arguments, words = BAD[case]
+    name, content, words, *arguments = BAD[case]
     path = tmp_path / name
     if isinstance(content, pd.DataFrame):
         content.to_parquet(path)
@@ -188,31 +190,29 @@ def test_bad_sources_are_refused(tmp_path, refused, case):
     elif content is not None:
         path.write_bytes(content)
     with refused(words):
-        read_source(path, **arguments)
+        read_source(path, **dict(*arguments))
 
 
 def test_influxdb_refuses_columns_and_an_incomplete_location(monkeypatch, refused):
     for name in ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG"):
         monkeypatch.delenv(name, raising=False)
-    with refused("time='utc'"):
-        read_source("influxdb://bucket/bus/volts", time="utc")
-    with refused("columns=['volts']"):
-        read_source("influxdb://bucket/bus/volts", ["volts"])
-    with refused("INFLUXDB_V2_URL"):
-        read_source("influxdb://bucket/bus/volts")
+    for words, arguments in (
+        ("time='utc'", {"time": "utc"}),
+        ("columns=['volts']", {"columns": ["volts"]}),
+        ("INFLUXDB_V2_URL", {}),
+    ):
+        with refused(words):
+            read_source("influxdb://bucket/bus/volts", **arguments)
 
 
 @pytest.mark.parametrize("interval_s", [1 / 3, 1 / 30, 0.7])
-def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
-    times = (np.arange(400) * interval_s).round(3 if interval_s > 0.1 else 4)
-    pd.DataFrame({"v": np.arange(400) % 7, "t": times}).to_csv(tmp_path / "a.csv", index=False)
-    (part,) = clean(
-        read_source(tmp_path / "a.csv", ["v"], "t", Cleaning(time_format="s"))["v"]
-    ).parts
-    assert (
-        np.abs(part.time_s - times).max() < 0.05 * interval_s
-        and part.values[:, 0].tolist() == (np.arange(400) % 7).tolist()
-    )
+def test_times_rounded_to_milliseconds_are_regular(written, interval_s):
+    rows = np.arange(400)
+    times = (rows * interval_s).round(3 if interval_s > 0.1 else 4)
+    path = written(pd.DataFrame({"v": rows % 7, "t": times}))
+    (part,) = clean(read_source(path, ["v"], "t", Cleaning(time_format="s"))["v"]).parts
+    assert np.abs(part.time_s - times).max() < 0.05 * interval_s
+    assert part.values[:, 0].tolist() == (rows % 7).tolist()
     assert (part.start[:19], part.clock.unit) == ("1970-01-01T00:00:00", "s")
 
 
@@ -258,16 +258,13 @@ def test_what_is_no_source_is_refused(source, refused):
         read_source(source)
 
 
-def test_a_defect_of_ours_is_not_said_to_be_one_of_the_file(tmp_path, monkeypatch):
-    np.save(tmp_path / "a.npy", VALUES)
-    pd.DataFrame({"volts": VALUES}).to_csv(tmp_path / "a.csv", index=False)
-
+def test_a_defect_of_ours_is_not_said_to_be_one_of_the_file(saved, written, monkeypatch):
     def defect(*given, **options):
         raise AttributeError("a defect")
 
     monkeypatch.setattr(channels, "lay_out", defect)
     monkeypatch.setattr(sources, "refuse_channels_first", defect)
     monkeypatch.setattr(sources, "RawChannel", defect)
-    for name in ("a.npy", "a.csv"):
+    for path in (saved(VALUES), written("volts\n1\n2\n")):
         with pytest.raises(AttributeError, match="a defect"):
-            read_source(tmp_path / name)
+            read_source(path)

@@ -1,7 +1,5 @@
 """Times in forms that only a rule tells apart, each worked by hand."""
 
-import contextlib
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -63,56 +61,52 @@ class Log:
         return f"row {number}"
 
 
-@pytest.mark.parametrize("minutes", [[0, 20, 40, 60, 20, 40, 60], [0, 20, 20, 40, 60, 20, 40, 60]])
+def refuse_minutes(minutes, order=1, has_zone=False):
+    """Refuses rows in another order than that of their times if their clock steps back."""
+    times = 60 * 10**9 * np.array(minutes)[::order]
+    refuse_steps_back(times, np.arange(len(minutes))[::order], Log(), "volts", has_zone)
+
+
+@pytest.mark.parametrize("minutes", [[0, 20, 40, 60, 0, 20, 40], [0, 20, 20, 40, 60, 0, 20, 40]])
 def test_times_that_step_back_by_an_hour_are_refused(refused, minutes):
-    # the clock goes from 60 to 0
-    minutes = np.array(minutes) - np.where(np.arange(len(minutes)) > len(minutes) - 4, 20, 0)
     with refused(f"row {len(minutes) - 3} of volts", "--timezone"):
-        refuse_steps_back(
-            60 * 10**9 * minutes, np.arange(len(minutes)), Log(), "volts", has_zone=False
-        )
-
-
-@pytest.mark.parametrize("minutes", [[1_400, 1_420, 0, 20], [120, 140, 80, 100]])
-def test_a_step_back_by_a_day_or_an_hour_is_refused_unless_a_zone_is_known(refused, minutes):
-    given = 60 * 10**9 * np.array(minutes), np.arange(4), Log(), "volts"
-    with refused("row 2 of volts", "one day" if minutes[0] > 1_000 else "one hour"):
-        refuse_steps_back(*given, has_zone=False)
-    refuse_steps_back(*given, has_zone=True)
+        refuse_minutes(minutes)
 
 
 @pytest.mark.parametrize(
-    ("minutes", "row", "words"),
-    [
-        ([*range(60), *range(20, 80)], 60, "cover the same time once more"),
-        ([minute for _ in range(6) for minute in range(20)], 20, "cover the same time once more"),
-    ],
+    ("minutes", "words"),
+    [([1_400, 1_420, 0, 20], "one day"), ([120, 140, 80, 100], "one hour")],
+)
+def test_a_step_back_by_a_day_or_an_hour_is_refused_unless_a_zone_is_known(refused, minutes, words):
+    with refused("row 2 of volts", words):
+        refuse_minutes(minutes)
+    refuse_minutes(minutes, has_zone=True)
+
+
+@pytest.mark.parametrize(
+    ("minutes", "row"), [([*range(60), *range(20, 80)], 60), ([*range(20)] * 6, 20)]
 )
 @pytest.mark.parametrize("has_zone", [False, True])
 @pytest.mark.parametrize("order", [1, -1])
-def test_dates_that_begin_again_are_refused(refused, minutes, row, words, has_zone, order):
-    times = 60 * 10**9 * np.array(minutes)[::order]
-    with refused(f"row {row} of volts", words):
-        refuse_steps_back(times, np.arange(len(minutes))[::order], Log(), "volts", has_zone)
+def test_dates_that_begin_again_are_refused(refused, minutes, row, has_zone, order):
+    with refused(f"row {row} of volts", "cover the same time once more"):
+        refuse_minutes(minutes, order, has_zone)
 
 
-def test_hours_from_1_to_12_are_refused_and_blocks_in_another_order_are_not(refused):
-    for hours, is_refused in (
-        ([10, 11, 12, 1, 2, 3, 4], True),
-        ([12, 14, 16, 18, 6, 8, 10], False),
-    ):
-        times = 3_600 * 10**9 * np.array(hours)
-        with refused("hours from 1 to 12") if is_refused else contextlib.nullcontext():
-            refuse_steps_back(times, np.arange(7), Log(), "volts", has_zone=False)
+def test_hours_from_1_to_12_are_refused(refused):
+    with refused("hours from 1 to 12"):
+        refuse_minutes([60 * hour for hour in (10, 11, 12, 1, 2, 3, 4)])
+
+
+def test_blocks_in_another_order_are_no_steps_of_a_clock():
+    refuse_minutes([60 * hour for hour in (12, 14, 16, 18, 6, 8, 10)])
 
 
 def test_what_fills_a_gap_late_is_no_clock_that_was_set():
     blocks = [range(200, 400), range(200), range(400, 500), range(540, 600), range(500, 540)]
-    minutes = np.array([minute for block in blocks for minute in block])
-    refuse_steps_back(60 * 10**9 * minutes, np.arange(600), Log(), "volts", has_zone=True)
+    refuse_minutes([minute for block in blocks for minute in block], has_zone=True)
 
 
 @pytest.mark.parametrize("minutes", [1, 10, 20, 30, 60, 240, 720, 1_440])
 def test_dates_that_go_down_throughout_begin_nowhere_again(minutes):
-    times = 60 * 10**9 * minutes * np.arange(400)[::-1]
-    refuse_steps_back(times, np.arange(400), Log(), "volts", has_zone=False)
+    refuse_minutes(minutes * np.arange(400)[::-1])
