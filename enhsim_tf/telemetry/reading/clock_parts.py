@@ -19,7 +19,6 @@ from enhsim_tf.telemetry.reading.clock_values import are_whole
 from enhsim_tf.telemetry.reading.column_names import (
     UNIT_OF,
     UNITS,
-    name_tells,
     without_ends,
     words_of,
 )
@@ -62,8 +61,8 @@ def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
     """
     found = {}
     for name, values in table.numbers.items():
-        words = _TIMES_OF_DAY.intersection(words_of(name))
-        if words and name_tells(name)[0] == 2:
+        words = set(words_of(name)) - {"time", "utc", "gmt", "local"}
+        if len(words) == 1 and words <= _TIMES_OF_DAY and "hour" not in parts_of(table.numbers):
             digits = len(words.pop())
             if are_whole(values, 0, 24 * 10 ** (digits - 2)) and may_be_time_of_day(values):
                 found[name] = pd.Series(values.astype(int).astype(str)).str.zfill(digits)
