@@ -11,17 +11,9 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import (
-    may_be_time_of_day,
-    parse_times,
-)
+from enhsim_tf.telemetry.cleaning.times import may_be_time_of_day, parse_times
 from enhsim_tf.telemetry.reading.clock_values import are_whole
-from enhsim_tf.telemetry.reading.column_names import (
-    UNIT_OF,
-    UNITS,
-    without_ends,
-    words_of,
-)
+from enhsim_tf.telemetry.reading.column_names import UNIT_OF, UNITS, without_ends, words_of
 from enhsim_tf.telemetry.reading.contents import Contents, different, first_cells
 
 _PARTS = {
@@ -62,13 +54,16 @@ def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
     found = {}
     for name, values in table.numbers.items():
         words = set(words_of(name)) - {"time", "utc", "gmt", "local"}
-        if len(words) == 1 and words <= _TIMES_OF_DAY and "hour" not in parts_of(table.numbers):
+        if len(words) == 1 and words <= _TIMES_OF_DAY:
             digits = len(words.pop())
             if are_whole(values, 0, 24 * 10 ** (digits - 2)) and may_be_time_of_day(values):
-                found[name] = pd.Series(values.astype(int).astype(str)).str.zfill(digits)
-    if len(found) != 1 or table.of_kind("times of day") or not (dates or clock_of_parts(table)):
+                found[name] = digits
+    if len(found) != 1 or table.of_kind("times of day") or "hour" in parts_of(table.numbers):
         return table
-    ((name, text),) = found.items()
+    if not (dates or clock_of_parts(table)):
+        return table
+    ((name, digits),) = found.items()
+    text = pd.Series(table.numbers[name].astype(int).astype(str)).str.zfill(digits)
     text = text.str.replace(r"(?<=\d)(?=(?:\d\d)+$)", ":", regex=True)
     numbers = {other: values for other, values in table.numbers.items() if other != name}
     return dataclasses.replace(
