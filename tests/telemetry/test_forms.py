@@ -698,6 +698,20 @@ def test_what_is_named_like_a_part_of_a_time_but_is_none_is_a_channel(
     assert clean(channels[names[0]]).telemetry.interval_s == interval_s
 
 
+@pytest.mark.parametrize(
+    ("header", "form", "step"),
+    [
+        ("Date,Hour,HHMM,v", "%Y-%m-%d,%H", "h"),
+        ("Date,Time,HHMM,v", "%Y-%m-%d,%H:%M", "min"),
+        ("Date,Run time (HHMM),v", "%Y-%m-%d", "D"),
+    ],
+)
+def test_the_time_of_day_of_something_else_moves_no_row(written, header, form, step):
+    times = pd.date_range(START, periods=N, freq=step)
+    text = table(header, times.strftime(form), 100 * (ROWS % 24) + ROWS * 7 % 60, VALUES)
+    check(read_source(written(text))["v"], interval_s=(times[1] - times[0]).total_seconds())
+
+
 @pytest.mark.parametrize("part", ["second", "hour"])
 def test_a_part_of_a_time_that_is_out_of_range_loses_its_row_alone(part):
     frame = pd.DataFrame(

@@ -63,8 +63,10 @@ def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
     if not (dates or clock_of_parts(table)):
         return table
     ((name, digits),) = found.items()
-    text = pd.Series(table.numbers[name].astype(int).astype(str)).str.zfill(digits)
-    text = text.str.replace(r"(?<=\d)(?=(?:\d\d)+$)", ":", regex=True)
+    clocks = pd.Series(table.numbers[name].astype(int))
+    text = clocks.map(
+        {clock: ":".join(re.findall("..", f"{clock:0{digits}}")) for clock in clocks.unique()}
+    )
     numbers = {other: values for other, values in table.numbers.items() if other != name}
     return dataclasses.replace(
         table,
