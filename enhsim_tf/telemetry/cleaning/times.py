@@ -580,9 +580,9 @@ def refuse_steps_back(
         if is_change and not has_zone:
             how = "state no zone and repeat one hour, as local clocks do"
         elif are(UNITS_NS["D"]) and len(np.unique(times)) == len(times) and not has_zone:
-            how = "state no zone and step back by one day, as where a date stays past midnight"
-            options += counting
-            otherwise = ""
+            how = "step back by one day, as where a date stays past midnight"
+            options = counting
+            otherwise = "the right dates, or --timezone if these are right"
         elif (
             are(12 * hour)
             and not has_zone
