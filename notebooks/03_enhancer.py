@@ -140,8 +140,8 @@ with drawing(alt, height=2.3, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the held-out loss stays above the dotted line and hardly falls after about ten epochs, apart from a jump. At the end the
-# training loss is lower. The held-out windows have the same 480 inputs (notebook 02), so that the error to the true signal is about the
-# same in both: only learnt noise can explain the difference. The network has seen it 40 times.
+# training loss is lower. Nearly all inputs of the held-out windows also occur in training (notebook 04), so that the error to the true
+# signal is about the same in both: only learnt noise can explain the difference. The network has seen it 40 times.
 
 # %%
 of_training = np.mean((pipeline.enhance(train["coarse"]) - train["truth"]) ** 2)

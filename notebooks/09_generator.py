@@ -183,9 +183,10 @@ assert beyond["generated, before the tanh"] < 1e-9 and beyond["real noise"] > 0.
 assert rank(generated) < rank(real) / 2
 
 # %% [markdown]
-# **Answer.** The 64 neurons: before the tanh, every window is a sum of 64 shapes, so that generated windows differ from each other in at
-# most 64 dimensions, and not equally in all of these, and real ones in nearly all 500. What the 16 numbers limit, exercise 2 asks. The PCA
-# residual of notebook 13 looks at just that: what lies outside the main dimensions.
+# **Answer.** Both numbers: before the tanh, every window is a sum of 64 shapes, so that generated windows differ from each other in at most
+# 64 dimensions. The 16 numbers decide how the shapes are mixed, so that most of the variance lies in far fewer dimensions: the curve bends
+# near the seventeenth. Real windows differ in nearly all 500. The PCA residual of notebook 13 looks at just that: what lies outside the main
+# dimensions.
 #
 # ## Exercises
 #
@@ -233,5 +234,5 @@ def is_right(answer):
 check_answer(
     one_is_enough,
     is_right,
-    "Draw latent vectors of shape (1000, latent), predict, and drop the last axis: windows[:, :, 0].",
+    "Draw latent vectors of shape (1000, latent) with settings.latent_scale, as above, and drop the last axis: windows[:, :, 0].",
 )

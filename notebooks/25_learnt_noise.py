@@ -217,8 +217,8 @@ with drawing(alt, height=2.0, title="The network expects larger samples while a 
     panel.legend(frameon=False, loc="lower left", ncols=2)
 
 # %% [markdown]
-# *What to see:* the orange lines open after the first loud samples of a burst and close after the last. The network does not foresee a
-# burst, but expects it to go on.
+# *What to see:* the orange lines open after the first loud samples of a burst and close within some twenty samples after the last. The
+# network does not foresee a burst, but expects it to go on. The two narrow peaks are errors of the predicted density.
 
 # %%
 loud = np.abs(chosen[PAST - 5 : -5]) > 2  # five samples ago, it was loud

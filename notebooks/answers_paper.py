@@ -101,7 +101,7 @@ def share_of_sd(series, width):
 def rank_of_untrained(settings, latent, hidden):
     """The effective rank of 1,000 windows of an untrained generator."""
     generator = build_generator(dataclasses.replace(settings, latent=latent, generator_units=hidden))
-    draws = np.random.default_rng(0).standard_normal((1_000, latent), "float32")
+    draws = settings.latent_scale * np.random.default_rng(0).standard_normal((1_000, latent), "float32")
     return effective_rank(generator.predict(draws, verbose=0)[:, :, 0])
 
 

@@ -196,7 +196,7 @@ EXERCISES = [
         2,
     ),
     Exercise(
-        "20",
+        "10",
         "Rank by pairs",
         "Nominal windows have the scores {nominal}, anomalous ones {anomalous}. What is the AUC?",
         lambda rng: {
@@ -218,14 +218,14 @@ EXERCISES = [
     Exercise(
         "31",
         "Two channels together",
-        "Two channels have mean 0, standard deviation 1 and the correlation {rho}. A window has the means {first} and {second}. "
-        "What is its squared Mahalanobis distance?",
+        "The means of windows of two channels have mean 0, standard deviation 1 and the correlation {rho}. A window has the means {first} "
+        "and {second}. What is its squared Mahalanobis distance?",
         from_choices(rho=[0.5, 0.6, 0.8, 0.9, 0.95], first=[0.5, 1.0, 1.5], second=[-1.5, -1.0, -0.5, 2.0]),
         lambda rho, first, second: (first**2 - 2 * rho * first * second + second**2) / (1 - rho**2),
         2,
     ),
 ]
-"""One exercise for each lesson of the core, and some more."""
+"""Exercises for lessons of the core, and some more."""
 
 
 def drawn(seed: int) -> list[Values]:

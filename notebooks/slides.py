@@ -129,7 +129,7 @@
 # - nearly always
 
 # %% [markdown] slideshow={"slide_type": "slide"}
-# ## What no eye sees, a detector does
+# ## What a glance misses, a detector sees
 #
 # ![False alarms by training data](13_combined.ipynb#2)
 
