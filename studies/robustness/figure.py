@@ -18,7 +18,6 @@ from enhsim_tf.common.plot_style import (
     REAL,
     RESIDUALS,
     RIDGE,
-    label_ends,
     new_sheet,
     panels,
 )
@@ -106,24 +105,16 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     )
     curves = found["modes"]["by_mode"]
     modes = [mode for mode in curves["paper"] if mode != "nominal"]
-    grid = panels(figure, down + 0.22, 2, 3, right=1.2, gap=(0.42, 0.2), sharex=True, sharey=True)
+    grid = panels(figure, down + 0.22, 2, 3, right=1.45, gap=(0.42, 0.2), sharex=True, sharey=True)
     for axes, mode in zip(grid.ravel(), modes, strict=True):
         axes.axvspan(0, LARGEST_TRAINED, color=GREY_TINT, zorder=0)
-        for method, (colour, style, _) in _METHODS.items():
-            axes.plot(
-                *np.transpose(curves[method]["nominal"] + curves[method][mode]), style, color=colour
-            )
+        for method, (colour, style, label) in _METHODS.items():
+            errors = np.transpose(curves[method]["nominal"] + curves[method][mode])
+            axes.plot(*errors, style, color=colour, label=label)
         axes.set_title(mode.replace("_", " "))
         axes.set_ylim(0, None)
         axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
-    last = modes[2]
-    label_ends(
-        grid[0, -1],
-        {
-            label: ([curves[method][last][-1][1]], colour)
-            for method, (colour, _, label) in _METHODS.items()
-        },
-    )
+    grid[0, -1].legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1.05))
     for axes in grid[-1]:
         axes.set_xlabel("severity")
     for axes in grid[:, 0]:
