@@ -310,7 +310,7 @@ num_windows = [5 * point["units"] for point in points]  # an orbit has five wind
 with drawing(
     "Share of fault windows found over the number of known windows, for four uses of a simulator",
     height=2.4,
-    title="As a reference, the battery's simulator finds most; as a source, hardly more than none",
+    title="The battery's simulator helps most as a reference, little as a source",
 ) as panel:
     for use, (label, color, style, marker) in looks.items():
         percent = [100 * value for value in recall[use]]
