@@ -185,8 +185,8 @@ assert rank(generated) < rank(real) / 2
 # %% [markdown]
 # **Answer.** Both numbers: before the tanh, every window is a sum of 64 shapes, so that generated windows differ from each other in at most
 # 64 dimensions. The 16 numbers decide how the shapes are mixed, so that most of the variance lies in far fewer dimensions: the curve bends
-# near the seventeenth. Real windows differ in nearly all 500. The PCA residual of notebook 13 looks at just that: what lies outside the main
-# dimensions.
+# near the seventeenth. Real windows differ in nearly all 500. The PCA residual of notebook 13 looks at just that: what lies outside the
+# main dimensions.
 #
 # ## Exercises
 #

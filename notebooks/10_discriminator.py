@@ -171,8 +171,8 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
 
 # %% [markdown]
 # *What to see:* on the left, the points lie near the diagonal. In the middle they scatter more widely, and on the right they scatter most,
-# and many lie far below it. But all probabilities lie close to one half. (The axes differ in scale.) Reordered blocks keep nearly all pieces of 20 samples, reordered samples keep none,
-# and in the larger windows every piece has grown.
+# and many lie far below it. But all probabilities lie close to one half. (The axes differ in scale.) Reordered blocks keep nearly all
+# pieces of 20 samples, reordered samples keep none, and in the larger windows every piece has grown.
 
 # %%
 moved = {name: float(np.mean(np.abs(other - recorded))) for name, other in judged.items()}

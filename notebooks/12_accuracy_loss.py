@@ -65,9 +65,9 @@ num_records = settings.iterations // settings.record_every
 history = {key: values[:num_records] for key, values in pipeline.history.items() if values.ndim}
 
 # %% [markdown]
-# *What to see:* both losses stay near ln 2. When one accuracy rises, the other falls. The reason is that $D$ is near one half for every row,
-# real or generated (notebook 10 shows its range). When all values of $D$ move a little, nearly all rows change to the other side of one
-# half together, and are then all called real, or all generated. The accuracy jumps; the loss shows how little has changed.
+# *What to see:* both losses stay near ln 2. When one accuracy rises, the other falls. The reason is that $D$ is near one half for every
+# row, real or generated (notebook 10 shows its range). When all values of $D$ move a little, nearly all rows change to the other side of
+# one half together, and are then all called real, or all generated. The accuracy jumps; the loss shows how little has changed.
 
 # %%
 last = {key: float(values[-1]) for key, values in history.items()}
@@ -98,8 +98,8 @@ say(
 assert budget == "smoke" or np.sum(steps > 2 * 2**0.5 * error) > 2
 
 # %% [markdown]
-# So the large swings are not chance: $D$ moves over one half several times. Both accuracies together may even be far below one half, because
-# each record follows an update of the generator, which raises $D$ of generated rows.
+# So the large swings are not chance: $D$ moves over one half several times. Both accuracies together may even be far below one half,
+# because each record follows an update of the generator, which raises $D$ of generated rows.
 
 # %% [markdown]
 # ## What the figure does not show

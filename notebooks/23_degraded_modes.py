@@ -141,8 +141,8 @@ with drawing(alt, height=2.4, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* what is far right is mostly high up. The score looks neither at the truth nor at the network. It flags more nominal windows
-# than the 1 % that it was set for, because the limit rests on windows that are not *exchangeable* with these (notebook 13): they begin every
-# 500 s, which gives only 24 different coarse windows, and those that are judged begin anywhere.
+# than the 1 % that it was set for, because the limit rests on windows that are not *exchangeable* with these (notebook 13): they begin
+# every 500 s, which gives only 24 different coarse windows, and those that are judged begin anywhere.
 
 # %%
 from scipy.stats import spearmanr
