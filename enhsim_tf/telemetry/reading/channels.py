@@ -77,72 +77,65 @@ def read_table_channels(
     options: Cleaning,
 ) -> Channels:
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
-    what = "the table"
-    if not isinstance(source, pd.DataFrame | pd.Series):
-        what = source.name if isinstance(source, Path) else f"{source[0].name} ..."
-    table = read_table(source, options)
-    given = table.frame.columns
-    table = _with_different_names(table, columns, time, options, what)
+    given = read_table(source, options)
+    table = _with_different_names(given, columns, time, options)
+    frame = table.frame
     # others are names of series
-    named = (
-        list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None
-    )
-    layout = lay_out(table, named, time, options, what)
-    if columns is None and (several := [name for name in layout.channels if name not in given]):
+    named = list(columns) if columns is not None and set(columns) <= set(frame.columns) else None
+    layout = lay_out(table, named, time, options)
+    several = [name for name in layout.channels if name not in given.frame.columns]
+    if columns is None and several:
         raise InputError(
-            f"Expected channels of different names. Received: {', '.join(several[:8])} in {what}, "
-            "numbered here.",
+            f"Expected channels of different names. Received: {', '.join(several[:8])} in "
+            f"{table.what}, numbered here.",
             [{"columns": list(layout.channels)}, *({"columns": [name]} for name in several[:4])],
             "other names",
         )
-    keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]
+    keys = [key for key in _keys_of(layout, options) if key not in (named or ())]
     findings = list(table.findings)
     for kind, text in _SAID.items():
         used = (*keys, *(layout.words if options.states else ()))
         if names := [name for name in layout.left_out.get(kind, ()) if name not in used]:
             text += f": {', '.join(names[:8])}"
-            if any(name in layout.words and _is_state(table.frame[name]) for name in names):
+            if any(name in layout.words and _is_state(frame[name]) for name in names):
                 text += " (--states reads states)"
             findings.append(Finding(kind, len(names), text))
     if keys:
-        chosen, noted = _several_series(table, keys, layout, columns is None, what)
+        chosen, noted = _several_series(layout, keys, columns is None)
     else:
-        _refuse_parallel_files(table.places, layout, what)
-        chosen = {name: (name, None) for name in layout.channels}
+        _refuse_parallel_files(layout)
+        names = layout.channels
         noted = []
         if options.states:
-            table, states, noted = _with_states(table, layout, named)
-            chosen = {name: place for name, place in chosen.items() if name not in layout.words}
-            chosen |= {name: (name, None) for name in states}
-    findings += noted
+            frame, states, noted = _with_states(layout, named)
+            names = (*(name for name in names if name not in layout.words), *states)
+        chosen = {name: (name, None) for name in names}
+    layout = dataclasses.replace(layout, frame=frame, findings=(*findings, *noted))
     if columns is not None and named is None:
         unknown = next((name for name in columns if name not in chosen), None)
         if unknown is not None:
-            known = ", ".join(list(chosen)[:8]) or ", ".join(table.frame.columns[:8])
+            known = ", ".join(list(chosen)[:8]) or ", ".join(frame.columns[:8])
             raise InputError(
-                f"Expected a channel of {what}: {known}. Received: {unknown!r}. Name one of these."
+                f"Expected a channel of {table.what}: {known}. Received: {unknown!r}. Name one of "
+                "these."
             )
         chosen = {name: chosen[name] for name in columns}
     if not chosen:
-        _refuse_without_numbers(table, layout, findings, bool(keys), options, what)
-    channels = {
-        name: _channel(table, layout, name, *place, findings, options)
-        for name, place in chosen.items()
-    }
-    return Channels(channels, table.frame)
+        _refuse_without_numbers(layout, bool(keys), options)
+    channels = {name: _channel(layout, name, *place, options) for name, place in chosen.items()}
+    return Channels(channels, frame)
 
 
 def _several_series(
-    table: Table, keys: Sequence[str], layout: Layout, leave_out_empty: bool, what: str
+    layout: Layout, keys: Sequence[str], leave_out_empty: bool
 ) -> tuple[dict[str, tuple[str, np.ndarray]], list[Finding]]:
     """Returns the column and the rows of each of several series by its name, without those that
     have no numbers if `leave_out_empty`, and findings.
     """
-    channels = [name for name in layout.channels if name not in keys]
-    chosen = _name_series(table.frame, keys, channels, what)
+    chosen = _name_series(layout, keys)
     findings = []
     if leave_out_empty and (
-        empty := [name for name, place in chosen.items() if not _has_numbers(table, *place)]
+        empty := [name for name, place in chosen.items() if not _has_numbers(layout, *place)]
     ):
         chosen = {name: place for name, place in chosen.items() if name not in empty}
         text = f"series without numbers: {', '.join(empty[:8])}"
@@ -154,30 +147,21 @@ def _several_series(
     return chosen, findings
 
 
-def _refuse_without_numbers(
-    table: Table,
-    layout: Layout,
-    findings: Sequence[Finding],
-    has_keys: bool,
-    options: Cleaning,
-    what: str,
-) -> NoReturn:
+def _refuse_without_numbers(layout: Layout, has_keys: bool, options: Cleaning) -> NoReturn:
     """Refuses a table without channels, and says what was left out."""
-    left = ", ".join(
-        _with_cell(table.frame[name]) for names in layout.left_out.values() for name in names
-    )
-    left = "".join(f"; {finding.text}" for finding in findings if finding.kind == "files") + (
-        f"; left out: {left}" if left else ""
-    )
-    may_be_states = not options.states and any(
-        _is_state(table.frame[name]) for name in layout.words
-    )
+    frame = layout.frame
+    others = (_with_cell(frame[name]) for names in layout.left_out.values() for name in names)
+    left = [finding.text for finding in layout.findings if finding.kind == "files"]
+    if named := ", ".join(others):
+        left.append(f"left out: {named}")
+    left = "".join(f"; {text}" for text in left)
+    may_be_states = not options.states and any(_is_state(frame[name]) for name in layout.words)
     pairs = "only numbers below a line of names, with commas between them"
     other = "one number in each cell"
-    if ".xls" in what:
+    if ".xls" in layout.what:
         other += ", with the saved values of formulas"
     raise InputError(
-        f"Expected a column of numbers. Received: none in {what} beside the times{left}.",
+        f"Expected a column of numbers. Received: none in {layout.what} beside the times{left}.",
         [{"states": True} | ({"series_column": NO_TIME} if has_keys else {})]
         if may_be_states
         else (),
@@ -198,10 +182,10 @@ def _is_state(cells: pd.Series) -> bool:
 
 
 def _with_states(
-    table: Table, layout: Layout, named: Sequence[str] | None
-) -> tuple[Table, list[str], list[Finding]]:
+    layout: Layout, named: Sequence[str] | None
+) -> tuple[pd.DataFrame, list[str], list[Finding]]:
     """Adds columns of 0 and 1 for columns of words: one for two words, otherwise one for each."""
-    frame = table.frame.copy(deep=False)
+    frame = layout.frame.copy(deep=False)
     names = []
     findings = []
     for name in layout.words if named is None else [name for name in named if name in layout.words]:
@@ -218,24 +202,25 @@ def _with_states(
         names += made
         said = f"{words[0]} is 0, {words[1]} is 1" if len(words) == 2 else ", ".join(made)
         findings.append(Finding("states", len(made), f"words of {name!r} read as 0 and 1: {said}"))
-    return dataclasses.replace(table, frame=frame), names, findings
+    return frame, names, findings
 
 
-def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
+def _refuse_parallel_files(layout: Layout) -> None:
     """Refuses files over the same times, which are no parts of one series."""
-    if len({name for _, _, name in places.files}) < 2 or layout.times is None:
+    files = layout.places.files
+    if len({name for _, _, name in files}) < 2 or layout.times is None:
         return
     stamps = pd.Series(layout.times.stamps)
-    starts = [row for row, _, _ in places.files]
+    starts = [row for row, _, _ in files]
     file = np.searchsorted(starts, stamps.index, "right") - 1
     spans = stamps.groupby(file).agg(["min", "max"]).dropna().sort_values(["min", "max"])
     for one, other in itertools.pairwise(spans.itertuples()):
         shorter = min(one.max - one.min, other.max - other.min)
         if min(one.max, other.max) - other.min > shorter / 2:
-            first, second = (places.files[span.Index][2] for span in (one, other))
+            first, second = (files[span.Index][2] for span in (one, other))
             raise InputError(
                 f"Expected files whose times follow each other. Received: {first} and {second} "
-                f"over the same times, in {what}. Give them one by one."
+                f"over the same times, in {layout.what}. Give them one by one."
             )
 
 
@@ -246,7 +231,7 @@ def _with_cell(cells: pd.Series) -> str:
 
 
 def _with_different_names(
-    table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str
+    table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning
 ) -> Table:
     """Numbers names that repeat, as `volts.1` and `volts.2`; refuses names of options that do not
     occur.
@@ -262,33 +247,27 @@ def _with_different_names(
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(
             f"Expected columns of different names. Received: {twice!r} beside columns of one name, "
-            f"which are numbered, in {what}. Rename them."
+            f"which are numbered, in {table.what}. Rename them."
         )
     times = () if time is None else (time,)
     asked = [name for name in columns or () if name in repeated]
     for name in [*asked, *(options.label_column or ()), *(options.series_column or ()), *times]:
         if name not in names and name != NO_TIME:
             raise InputError(
-                f"Expected a column of {what}: {', '.join(names[:8])}. Received: {name!r}. Name "
-                "one of these."
+                f"Expected a column of {table.what}: {', '.join(names[:8])}. Received: {name!r}. "
+                "Name one of these."
             )
     return dataclasses.replace(table, frame=table.frame.set_axis(names, axis=1))
 
 
 def _channel(
-    table: Table,
-    layout: Layout,
-    name: str,
-    column: str,
-    rows: np.ndarray | None,
-    findings: Sequence[Finding],
-    options: Cleaning,
+    layout: Layout, name: str, column: str, rows: np.ndarray | None, options: Cleaning
 ) -> RawChannel:
     """Makes one raw channel."""
-    places = table.places
+    places = layout.places
     times = layout.times
-    findings = list(findings)
-    frame = table.frame
+    findings = list(layout.findings)
+    frame = layout.frame
     if rows is not None:
         frame = frame[[column, *layout.labels]].iloc[rows]
         places = Places(places.files, rows)
@@ -310,7 +289,7 @@ def _channel(
         if options.labelled == "missing":
             cells = cells.mask(mask) if not is_text(cells) else cells.astype(object).mask(mask)
     clock = " and ".join(map(repr, layout.clock.columns))
-    return RawChannel(name, cells, times, clock, 0, places, table.decimal, tuple(findings))
+    return RawChannel(name, cells, times, clock, 0, places, layout.decimal, tuple(findings))
 
 
 def _concerns(label: str, column: str, layout: Layout) -> bool:
@@ -323,7 +302,7 @@ def _concerns(label: str, column: str, layout: Layout) -> bool:
     return not owner or max(owner, key=len) == column
 
 
-def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) -> list[str]:
+def _keys_of(layout: Layout, options: Cleaning) -> list[str]:
     """Returns the columns whose values tell several series apart; none if the table holds one."""
     if options.series_column is not None:
         return [] if options.series_column == (NO_TIME,) else list(options.series_column)
@@ -332,7 +311,7 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
     candidates = [
         name
         for name in (*layout.words, *own)
-        if 1 < frame[name].nunique(dropna=False) <= _MAX_SERIES
+        if 1 < layout.frame[name].nunique(dropna=False) <= _MAX_SERIES
     ]
     ranks = {name: rank for rank, name in enumerate(_FIRST)}
     candidates.sort(key=lambda name: (name in own, ranks.get(name.casefold(), len(ranks))))
@@ -340,25 +319,22 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
     asks = bool(layout.channels) and not options.states
     chosen: list[str] = []
     for name in candidates:
-        if _is_key(frame, name, chosen, times, what if asks else None):
+        if _is_key(layout, name, chosen, times, asks):
             chosen.append(name)
-    if not chosen and "_field" in frame and "_value" in layout.channels:
+    if not chosen and "_field" in layout.frame and "_value" in layout.channels:
         return ["_field"]
     if not chosen and times is not None:
-        _refuse_numbered(frame, layout, times, what)
+        _refuse_numbered(layout, times)
     return chosen
 
 
 def _is_key(
-    frame: pd.DataFrame,
-    name: str,
-    chosen: Sequence[str],
-    times: np.ndarray | None,
-    what: str | None,
+    layout: Layout, name: str, chosen: Sequence[str], times: np.ndarray | None, asks: bool
 ) -> bool:
-    """Whether a column tells more series apart than the columns that were chosen before it; `what`
-    describes the source if it may ask.
+    """Whether a column tells more series apart than the columns that were chosen before it; where
+    it may be meant as one, `asks` says that this is refused.
     """
+    frame = layout.frame
     codes = _codes(frame, [*chosen, name])
     if chosen and codes.max() == _codes(frame, chosen).max():
         return False
@@ -382,10 +358,10 @@ def _is_key(
     if changes.sum() < 2 * (last + 1):  # one below the other
         return bool(((np.diff(times) < 0) & changes).sum() >= max(1, last) / 2)
     is_word = not frame[name].dropna().astype("str").str.match(r"\s*[+-]?\d").any()
-    if what is not None and is_word and changes.mean() > 0.5:
+    if asks and is_word and changes.mean() > 0.5:
         raise InputError(
             "Expected one series, or to know what tells several apart. Received: words that "
-            f"change from row to row in {name!r} of {what}.",
+            f"change from row to row in {name!r} of {layout.what}.",
             [{"series_column": name}, {"series_column": NO_TIME}],
         )
     return False
@@ -409,10 +385,11 @@ def _repeating(frame: pd.DataFrame, keys: Sequence[str], times: np.ndarray) -> f
     return float(rows.duplicated().mean()) if len(rows) else 0.0
 
 
-def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, what: str) -> None:
+def _refuse_numbered(layout: Layout, times: np.ndarray) -> None:
     """Refuses a table in which numbers, such as those of sensors, tell series apart, because a
     channel may look alike.
     """
+    frame = layout.frame
     if _repeating(frame, [], times) <= _OFTEN:
         return
     # where the clock was set, which is said when the channels are cleaned, a counter is no key
@@ -429,24 +406,24 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
         ):
             raise InputError(
                 "Expected one row for each time. Received: times that repeat, with different "
-                f"values of {name!r}, in {what}.",
+                f"values of {name!r}, in {layout.what}.",
                 [{"series_column": name}],
                 "a time of day in one column with its date, or an interval with --interval to take "
                 "their mean",
             )
 
 
-def _name_series(
-    frame: pd.DataFrame, keys: Sequence[str], channels: Sequence[str], what: str
-) -> dict[str, tuple[str, np.ndarray]]:
+def _name_series(layout: Layout, keys: Sequence[str]) -> dict[str, tuple[str, np.ndarray]]:
     """Returns the column and the rows of each series by its name: the values of the keys, and the
     column if there are several.
     """
+    frame = layout.frame
+    channels = [name for name in layout.channels if name not in keys]
     codes = _codes(frame, keys)
     if (codes.max(initial=-1) + 1) * len(channels) > MAX_COLUMNS:
         raise InputError(
             f"Expected at most {MAX_COLUMNS:,} series. Received: {codes.max() + 1:,} values of "
-            f"{', '.join(keys)} in {what}. Give another series_column."
+            f"{', '.join(keys)} in {layout.what}. Give another series_column."
         )
     # a blank line, as databases write at the end, is of no series
     filled = np.flatnonzero(frame.notna().any(axis=1))
@@ -461,8 +438,8 @@ def _name_series(
             name = ".".join([*words, channel] if len(channels) > 1 else words)
             if name in found:
                 raise InputError(
-                    f"Expected series of different names. Received: {name!r} twice in {what}. "
-                    f"Rename one of {', '.join(keys)}."
+                    f"Expected series of different names. Received: {name!r} twice in "
+                    f"{layout.what}. Rename one of {', '.join(keys)}."
                 )
             found[name] = (channel, inside)
     return found

@@ -54,6 +54,7 @@ from enhsim_tf.telemetry.reading.column_names import (
     words_of,
 )
 from enhsim_tf.telemetry.reading.contents import Contents, different, first_cells
+from enhsim_tf.telemetry.reading.text_files import Table
 
 # instead of the name of a time column: the table has no times, and samples are counted
 NO_TIME = "none"
@@ -281,7 +282,7 @@ def _refuse_unknown(table: Contents) -> None:
             )
 
 
-def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
+def unit_of(clock: Clock, table: Table) -> str | None:
     """Returns the unit or kind of days that the name of a clock's one column or the line of units
     states, or None.
 
@@ -290,29 +291,28 @@ def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
     if len(clock.columns) != 1:
         return None
     name = clock.columns[0]
-    factor = _FACTOR.search(f"{name} [{units.get(name, '').strip('[]() ')}]")
+    unit = table.units.get(name, "").strip(" []().")
+    factor = _FACTOR.search(f"{name} [{unit}]")
     is_one = factor and re.fullmatch(r"0+|1(?:\.0*)?|24", factor[1])
     if factor and not is_one and pd.api.types.is_numeric_dtype(clock.cells.dtype):
         raise InputError(
             f"Expected times in s, ms, us or ns. Received: a multiple of a unit in {name!r} of "
-            f"{what}.",
+            f"{table.what}.",
             [_COUNT],
             "the times in one of these units, and with its name",
         )
-    form = name_tells(name)[1] or UNIT_OF.get(units.get(name, "").strip(" []().").casefold())
+    form = name_tells(name)[1] or UNIT_OF.get(unit.casefold())
     if (
         form is None
         and pd.api.types.is_numeric_dtype(clock.cells.dtype)
         and re.search(r"dat(?:e|um)", name.casefold())
     ):
         values = clock.cells.to_numpy(np.float64, na_value=np.nan)
-        refuse_two_meanings(values[np.isfinite(values)], f"{name!r} of {what}", is_date=True)
+        refuse_two_meanings(values[np.isfinite(values)], f"{name!r} of {table.what}", is_date=True)
     return form
 
 
-def offset_of(
-    clock: Clock, frame: pd.DataFrame, above: str, zone: str | None, what: str
-) -> pd.Timedelta | None:
+def offset_of(clock: Clock, table: Table, zone: str | None) -> pd.Timedelta | None:
     """Returns the offset in a clock's name, as in `Time, GMT+02:00`, or None; refuses other
     statements of a zone, also in the text above the table, unless `zone` is given.
     """
@@ -321,13 +321,14 @@ def offset_of(
         return pd.Timedelta(f"{found[1]}:{found[2] or '00'}:00")
     if zone is not None:
         return None
+    frame = table.frame
     beside = [
         name
         for name in frame
         if _ZONE_COLUMN.search(name) or name.casefold() == "tz" and is_text(frame[name])
     ]
     cells = [str(cell).strip() for name in beside for cell in frame[name].dropna().unique()[:1]]
-    said = set(_PLACE.findall(" ".join((named, above, *cells))))
+    said = set(_PLACE.findall(" ".join((named, table.above, *cells))))
     places = sorted(said & zoneinfo.available_timezones()) if said else []
     offsets = [cell for cell in cells if re.fullmatch(r"[+-]\d\d:\d\d", cell)]
     head = frame.iloc[:LOOK]
@@ -337,25 +338,27 @@ def offset_of(
     if _ZONE.search(named) or (places or beside) and not is_utc:
         raise InputError(
             "Expected times that state their zone. Received: "
-            f"{', '.join(dict.fromkeys([named, *beside, *places]))} in {what}, where a zone is "
-            "named that is not read.",
+            f"{', '.join(dict.fromkeys([named, *beside, *places]))} in {table.what}, where a zone "
+            "is named that is not read.",
             [{"timezone": each} for each in dict.fromkeys((*places, *offsets, "UTC"))],
             "the zone of the clock, as Europe/Berlin",
         )
     return None
 
 
-def refuse_other_zone(times: Times, numbers: Mapping[str, np.ndarray], what: str) -> None:
-    """Refuses dates without a zone that numbers since 1970 show in another zone than UTC."""
-    for name, values in numbers.items():
+def refuse_other_zone(times: Times, table: Contents, further: Collection[str]) -> None:
+    """Refuses dates without a zone that `further` columns, of numbers since 1970, show in another
+    zone than UTC.
+    """
+    for name, values in table.numbers.items():
         unit = epoch_unit_of(values)
-        if unit is not None and name_tells(name)[0] == 2:
+        if name in further and unit is not None and name_tells(name)[0] == 2:
             stamps = pd.to_datetime(values, unit=unit, errors="coerce")
             apart = abs((stamps - times.stamps).median())
             if pd.Timedelta("15min") <= apart <= pd.Timedelta("14h"):
                 raise InputError(
                     f"Expected dates that agree with times since 1970. Received: {name!r} of "
-                    f"{what}, {apart.total_seconds() / 3600:g} h apart from them.",
+                    f"{table.what}, {apart.total_seconds() / 3600:g} h apart from them.",
                     [{"time": name}],
                     "the zone of the dates with --timezone",
                 )

@@ -49,9 +49,9 @@ _OWN = _LABELLED.union("scenario enhanced score score_after flag out_of_range".s
 _MAX_STATES = 10  # a label or flag has at most this many different values
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Layout:
-    """What the columns of a table are."""
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Layout(Table):
+    """A table, and what its columns are."""
 
     clock: Clock
     times: Times | None  # of the clock; None if samples are counted
@@ -63,7 +63,7 @@ class Layout:
 
 
 def lay_out(
-    table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str
+    table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning
 ) -> Layout:
     """Says what each column of a table, in which no name repeats, is; raises an `InputError` if the
     clock cannot be told.
@@ -72,7 +72,7 @@ def lay_out(
     or `NO_TIME`.
     """
     asked = set(columns or ())
-    contents = contents_of(table, asked, options.time_format, what)
+    contents = contents_of(table, asked, options.time_format)
     kinds = contents.kinds
     numbers = contents.numbers
     roles = dict.fromkeys(asked, "")  # of each column; that of a channel is ""
@@ -84,11 +84,11 @@ def lay_out(
         clock = find_clock(dataclasses.replace(contents, kinds=free, numbers=values))
     else:
         clock = Clock() if time == NO_TIME else Clock((time,), table.frame[time])
-    times = _times_of(clock, table, options, what) if clock.columns else None
+    times = _times_of(clock, table, options) if clock.columns else None
     further = further_clocks(contents, clock, times)
     _take(roles, {"clock": clock.columns, "further clocks": further})
     if times is not None and not times.zone and options.timezone is None:
-        refuse_other_zone(times, {name: numbers[name] for name in further & set(numbers)}, what)
+        refuse_other_zone(times, contents, further)
     free_numbers = {name: values for name, values in numbers.items() if name not in roles}
     has_names = "column 1" not in kinds
     counted = [
@@ -107,7 +107,15 @@ def lay_out(
     for name in kinds:
         if roles.get(name, "") not in ("", "clock", "series"):
             left_out.setdefault(roles[name], []).append(name)
-    return Layout(clock, times, tuple(channels), tuple(left_out.get("labels", ())), words, left_out)
+    return Layout(
+        **vars(table),
+        clock=clock,
+        times=times,
+        channels=tuple(channels),
+        labels=tuple(left_out.get("labels", ())),
+        words=words,
+        left_out=left_out,
+    )
 
 
 def _take(roles: dict[str, str], names_by_role: Mapping[str, Iterable[str]]) -> None:
@@ -143,17 +151,17 @@ def _roles_without_clock(
     }
 
 
-def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times:
+def _times_of(clock: Clock, table: Table, options: Cleaning) -> Times:
     """Parses a clock, with what its other columns add and the zone that its name states."""
-    form = options.time_format or unit_of(clock, table.units, what)
-    of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-    times = parse_times(clock.cells, of_what, options.drop_bad, form, table.places)
+    form = options.time_format or unit_of(clock, table)
+    what = f"the times {' and '.join(map(repr, clock.columns))} of {table.what}"
+    times = parse_times(clock.cells, what, options.drop_bad, form, table.places)
     if clock.added is not None:
         stamps = times.stamps + pd.TimedeltaIndex(clock.added)
         times = dataclasses.replace(times, stamps=stamps)
     if times.zone:
         return times
-    offset = offset_of(clock, table.frame, table.above, options.timezone, what)
+    offset = offset_of(clock, table, options.timezone)
     if offset is None:
         return times
     stamps = (times.stamps - offset).tz_localize("UTC")

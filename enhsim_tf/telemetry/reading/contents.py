@@ -32,14 +32,12 @@ _OBJECTS = {
 }
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Contents:
-    """What the columns of a table hold."""
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Contents(Table):
+    """A table, and what its columns hold."""
 
-    frame: pd.DataFrame
     kinds: Mapping[str, str]  # by column, see `_kind_of`
     numbers: Mapping[str, np.ndarray]  # the values of the columns of numbers
-    what: str  # description of the table, for messages
 
     def of_kind(self, kind: str) -> list[str]:
         """The columns of a kind."""
@@ -56,9 +54,7 @@ def different(frame: pd.DataFrame, names: list[str]) -> list[str]:
     return names[:1] + [name for name in names[1:] if not frame[name].equals(frame[names[0]])]
 
 
-def contents_of(
-    table: Table, asked: Collection[str], time_format: str | None, what: str
-) -> Contents:
+def contents_of(table: Table, asked: Collection[str], time_format: str | None) -> Contents:
     """Says what the columns of a table hold. Those that fit the time format hold dates, unless they
     are asked for as channels.
     """
@@ -83,7 +79,7 @@ def contents_of(
         for name, kind in kinds.items()
         if kind == "numbers"
     }
-    return Contents(frame, kinds, numbers, what)
+    return Contents(**vars(table), kinds=kinds, numbers=numbers)
 
 
 def _kind_of(cells: pd.Series) -> str:

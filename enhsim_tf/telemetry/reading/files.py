@@ -44,7 +44,9 @@ def read_table(
         else [source]
     )
     tables = [_with_plain_columns(_read_file(path, options), path.name) for path in paths]
-    return tables[0] if len(tables) == 1 else _join(tables, paths)
+    table = tables[0] if len(tables) == 1 else _join(tables, paths)
+    what = source.name if isinstance(source, Path) else f"{paths[0].name} ..."
+    return dataclasses.replace(table, what=what)
 
 
 def files_of(folder: Path) -> list[Path]:

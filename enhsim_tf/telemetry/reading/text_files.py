@@ -59,6 +59,7 @@ class Table:
     # cells of a line of units by column
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
     above: str = ""  # text that the file has beside the table
+    what: str = "the table"  # where it is from, for messages
 
 
 def table_of(
