@@ -116,11 +116,7 @@ def _joined(channels: Sequence[Telemetry]) -> Telemetry | None:
                 if begin <= low < begin + len(part)
             ]
             values = np.stack([part.values[here, 0] for part, here in pieces], axis=1)
-            measured = np.ones(values.shape, bool)
-            for channel, (part, here) in enumerate(pieces):
-                if part.measured is not None:
-                    measured[:, channel] = part.measured[here, 0]
-            measured = None if measured.all() else measured
+            measured = np.stack([part.measured[here, 0] for part, here in pieces], axis=1)
             begin_s = low * clock.interval_s
             shared.append(Part(values.astype(np.float32), begin_s, measured=measured))
     names = tuple(channel.columns[0] for channel in channels)

@@ -119,8 +119,8 @@ class Part:
         values: float32 array of shape `(samples, channels)`.
         offset_s: Time of the first sample in seconds after the zero of the clock, or in samples.
         carried: Columns that are no channels, such as `scenario`, with a value per sample each.
-        measured: Which values were measured and not filled in, of the shape of `values`; None if
-            all were.
+        measured: Which values were measured and not filled in, of the shape of `values`; all, if
+            it is not given.
     """
 
     values: np.ndarray
@@ -128,10 +128,22 @@ class Part:
     carried: Mapping[str, "pd.Series | np.ndarray"] = dataclasses.field(default_factory=dict)
     measured: np.ndarray | None = None
 
+    def __post_init__(self):
+        if self.measured is None:
+            object.__setattr__(self, "measured", np.broadcast_to(True, self.values.shape))
+
     def measured_values(self, channel: int) -> np.ndarray:
         """The values of a channel that were measured, one after another."""
-        values = self.values[:, channel]
-        return values if self.measured is None else values[self.measured[:, channel]]
+        return self.values[self.measured[:, channel], channel]
+
+    def cut(self, first: int, stop: int, interval_s: float) -> "Part":
+        """The samples from `first` up to, but not including, `stop`."""
+        return Part(
+            self.values[first:stop],
+            self.offset_s + interval_s * first,
+            {name: values[first:stop] for name, values in self.carried.items()},
+            self.measured[first:stop],
+        )
 
     def __len__(self) -> int:
         return len(self.values)
@@ -239,11 +251,7 @@ class Telemetry:
 
     def part(self, first: int, stop: int) -> "Telemetry":
         """The samples of the first part from `first` up to, but not including, `stop`."""
-        whole = self.parts[0]
-        carried = {name: values[first:stop] for name, values in whole.carried.items()}
-        begin_s = whole.offset_s + self.interval_s * first
-        measured = None if whole.measured is None else whole.measured[first:stop]
-        piece = Part(whole.values[first:stop], begin_s, carried, measured)
+        piece = self.parts[0].cut(first, stop, self.interval_s)
         return dataclasses.replace(self, parts=(piece,))
 
     def long_enough(self, window: int) -> "Telemetry | None":
@@ -260,11 +268,10 @@ class Telemetry:
         end: list[Part] = []
         for part in self.parts:
             cut = min(max(left, 0), len(part))
-            late_s = part.offset_s + cut * self.interval_s
-            begin += [Part(part.values[:cut], part.offset_s)] if cut else []
-            end += [Part(part.values[cut:], late_s)] if cut < len(part) else []
+            begin.append(part.cut(0, cut, self.interval_s))
+            end.append(part.cut(cut, len(part), self.interval_s))
             left -= len(part)
-        halves = (tuple(parts) for parts in (begin, end))
+        halves = (tuple(filter(len, parts)) for parts in (begin, end))
         return tuple(dataclasses.replace(self, parts=half) if half else None for half in halves)
 
     def select(self, columns: Sequence[str]) -> "Telemetry":
@@ -280,7 +287,7 @@ class Telemetry:
             dataclasses.replace(
                 part,
                 values=np.ascontiguousarray(part.values[:, places]),
-                measured=None if part.measured is None else part.measured[:, places],
+                measured=part.measured[:, places],
             )
             for part in self.parts
         )

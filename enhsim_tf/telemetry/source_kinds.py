@@ -38,14 +38,15 @@ def existing(source: str | os.PathLike | Sequence[str | os.PathLike]) -> str | P
             f"Expected a source of telemetry. Received: {type(source).__name__}. Give {SOURCES}; "
             "in Python also a DataFrame or a Series, or Telemetry.of an array."
         )
-    paths = [
-        Path(os.fspath(each)) if isinstance(each, str | os.PathLike) else None for each in source
+    wrong = [
+        str(path) if isinstance(path, str | os.PathLike) else type(path).__name__
+        for path in source or [source]
+        if not isinstance(path, str | os.PathLike) or not os.path.isfile(path)
     ]
-    wrong = [path for path in paths if path is None or not os.path.isfile(path)]
-    if wrong or not paths:
-        received = next(iter(wrong), None) or type(next(iter(source), source)).__name__
+    if wrong:
         raise InputError(
             "Expected files that exist, as several sources are files of one table. Received: "
-            f"{received}. Give one source."
+            f"{wrong[0]}. Give one source."
         )
+    paths = [Path(path) for path in source]
     return paths if len(paths) > 1 else paths[0]

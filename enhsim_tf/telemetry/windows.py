@@ -67,13 +67,14 @@ def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) 
 
 def places_in_parts(
     parts: Sequence[Sized], starts: np.ndarray, window: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns where each window lies: the number of its part, among those that are long enough, and
-    its first sample there.
+) -> tuple[list[Sized], np.ndarray, np.ndarray]:
+    """Returns the parts that are long enough and where each window lies: the number of its part
+    among these, and its first sample there.
     """
-    firsts = np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
+    usable = [part for part in parts if len(part) >= window]
+    firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
     which = np.searchsorted(firsts, starts, "right") - 1
-    return which, np.asarray(starts) - firsts[which]
+    return usable, which, np.asarray(starts) - firsts[which]
 
 
 def time_blocks(
@@ -167,8 +168,7 @@ def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.nda
     """Cuts windows out of series `(samples, columns)`, float32 of shape `(windows, samples,
     columns)`; starts as in this module.
     """
-    usable = [values for values in series if len(values) >= window]
-    which, places = places_in_parts(usable, starts, window)
+    usable, which, places = places_in_parts(series, starts, window)
     windows = np.empty((len(starts), window, series[0].shape[1]), np.float32)
     for number in np.unique(which):
         rows = which == number if len(usable) > 1 else slice(None)
@@ -186,8 +186,6 @@ def times_of(telemetry: "Telemetry", starts: np.ndarray, window: int) -> np.ndar
     """Returns the first sample of each window on the clock of the telemetry, integers of shape
     `(windows,)`.
     """
-    usable = [part for part in telemetry.parts if len(part) >= window]
-    which, places = places_in_parts(usable, starts, window)
-    return (
-        np.array([round(part.offset_s / telemetry.interval_s) for part in usable])[which] + places
-    )
+    usable, which, places = places_in_parts(telemetry.parts, starts, window)
+    begins = np.array([round(part.offset_s / telemetry.interval_s) for part in usable])
+    return begins[which] + places
