@@ -150,41 +150,42 @@ def _read_array(
     if columns is None and array.ndim == 2:
         refuse_channels_first(array.shape, path.name)
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
-    if columns is None and array.shape[1] > MAX_COLUMNS:
-        raise InputError(
-            f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in "
-            f"{path.name}. Name those to be read."
-        )
     if array.dtype == bool and options.states:
         array = array.astype(np.float64)
     stem = re.sub(r"\.npy(?:\.\w+)?$", "", path.name, flags=re.IGNORECASE)
-    columns = columns and [column.removeprefix(f"{stem}.") for column in columns]
     known = {str(number): number for number in range(array.shape[1])}
-    last = array.shape[1] - 1
-    found = {}
-    has_layout = array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array) > 0
-    has_commands = columns is None and has_layout and np.isin(array[:, 1:], (0, 1)).all()
-    may_be_table = array.shape[1] > 1 and array.dtype.kind in "fiu" and not has_commands
-    if columns is None and time is None and may_be_table and is_regular(array[:, 0]):
-        raise InputError(
-            f"Expected channels without a clock. Received: column 0 of {path.name}, which "
-            "increases in equal steps, as a clock does.",
-            [{"columns": [str(number) for number in range(1, array.shape[1])]}, {"time": NO_TIME}],
-            "a table with names",
-        )
-    for column in ["0"] if has_commands else columns or known:
-        if column not in known:
+    last = len(known) - 1
+    findings = ()
+    if columns is None:
+        columns = list(known)
+        is_plain = array.dtype.kind in "fiu" and len(array) > 0
+        if len(known) > MAX_COLUMNS:
             raise InputError(
-                f"Expected a column of {path.name}, a number from 0 to {last}. Received: "
-                f"{column!r}. Name one of these."
+                f"Expected at most {MAX_COLUMNS:,} columns. Received: {len(known):,} in "
+                f"{path.name}. Name those to be read."
             )
-        name = stem if last == 0 else f"{stem}.{column}"
-        findings = ()
-        if has_commands:
+        if is_plain and len(known) in _NUM_COLUMNS and np.isin(array[:, 1:], (0, 1)).all():
+            columns = ["0"]
             text = (
                 f"columns 1 to {last} hold only 0 and 1 and were taken as commands, not as "
                 f"channels: {last}"
             )
             findings = (Finding("commands", last, text),)
-        found[name] = RawChannel(name, pd.Series(array[:, known[column]]), findings=findings)
+        elif is_plain and last > 0 and time is None and is_regular(array[:, 0]):
+            raise InputError(
+                f"Expected channels without a clock. Received: column 0 of {path.name}, which "
+                "increases in equal steps, as a clock does.",
+                [{"columns": columns[1:]}, {"time": NO_TIME}],
+                "a table with names",
+            )
+    found = {}
+    for column in columns:
+        number = column.removeprefix(f"{stem}.")
+        if number not in known:
+            raise InputError(
+                f"Expected a column of {path.name}, a number from 0 to {last}. Received: "
+                f"{number!r}. Name one of these."
+            )
+        name = stem if last == 0 else f"{stem}.{number}"
+        found[name] = RawChannel(name, pd.Series(array[:, known[number]]), findings=findings)
     return Channels(found)
