@@ -19,7 +19,7 @@ from enhsim_tf.telemetry.cleaning.report import ROWS, Finding, Places
 _MISSING = ("", "na", "n/a", "#n/a", "<na>", "null", "none", "nat")
 _C_NAN = r"[+-]?(?:nan(?:\([a-z0-9_]*\))?|1\.#(?:qnan|snan|ind|nan)0*)"  # as printf of C writes NaN
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-_INFINITE = r"[+-]?inf(?:inity)?"
+_INFINITE = r"[+-]?(?i:inf(?:inity)?)"
 _COMMA = r"[+-]?(?:0?|[1-9]\d*|[1-9]\d{0,2}(?:\.\d{3})+),\d+(?:[eE][+-]?\d+)?"  # not +0123,1
 _COMMA_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+"
 _POINT_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+"
@@ -128,6 +128,18 @@ def is_text(values: pd.Series) -> bool:
     return values.dtype == object or pd.api.types.is_string_dtype(values.dtype)
 
 
+def are_strings(cells: pd.Series) -> np.ndarray:
+    """Mask of the cells of a column of text or objects that are text."""
+    if cells.dtype != object:
+        return np.ones(len(cells), bool)
+    return cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+
+
+def matches(text: pd.Series, pattern: str) -> np.ndarray:
+    """Mask of the cells of text, none of them missing, that match a pattern as a whole."""
+    return text.str.fullmatch(pattern).to_numpy(bool)
+
+
 def format_cell(cell: Any) -> str:
     """Formats a cell for a message, shortened to 60 characters."""
     text = repr(cell) if isinstance(cell, str) else str(cell)
@@ -137,9 +149,7 @@ def format_cell(cell: Any) -> str:
 def is_missing(cells: pd.Series) -> np.ndarray:
     """Mask of missing cells: None, NaN, empty text and words such as "n/a"."""
     missing = cells.isna().to_numpy(bool, copy=True)
-    of_text = ~missing
-    if cells.dtype == object:
-        of_text &= cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+    of_text = ~missing & are_strings(cells)
     text = cells if of_text.all() else cells[of_text]
     if (
         pd.api.types.is_string_dtype(text.dtype)
@@ -148,9 +158,7 @@ def is_missing(cells: pd.Series) -> np.ndarray:
     ):
         return missing  # no such word is that long, as dates are
     text = text.str.strip().str.casefold()
-    missing[of_text] = text.isin(_MISSING).to_numpy(bool) | text.str.fullmatch(_C_NAN).to_numpy(
-        bool
-    )
+    missing[of_text] = text.isin(_MISSING).to_numpy(bool) | matches(text, _C_NAN)
     return missing
 
 
@@ -188,36 +196,31 @@ def shows_comma(text: pd.Series) -> bool:
     """Whether text without missing cells has numbers whose comma can only be a decimal sign, such
     as 20,5, but not 1,500.
     """
-    cells = text.str.strip()
-    commas = cells[cells.str.fullmatch(_COMMA).to_numpy(bool)]
-    return (
-        bool(len(commas))
-        and not commas.str.fullmatch(_COMMA_THOUSANDS).all()
-        and not cells.str.fullmatch(_BOTH).any()
-    )
+    commas = text[matches(text, _COMMA)]
+    is_decimal = ~matches(commas, _COMMA_THOUSANDS)
+    return bool(is_decimal.any()) and not matches(text, _BOTH).any()
 
 
 def has_commas(text: pd.Series) -> bool:
     """Whether text without missing cells has numbers with commas, whatever these mean."""
-    return bool(text.str.strip().str.fullmatch(f"{_COMMA}|{_COMMA_THOUSANDS}").any())
+    return bool(matches(text, f"{_COMMA}|{_COMMA_THOUSANDS}").any())
 
 
 def allows_point_thousands(text: pd.Series) -> bool:
     """Whether every point in text without missing cells may separate thousands, such as in 1.200
     and 999.
     """
-    return bool(text.str.strip().str.fullmatch(f"{_POINT_THOUSANDS}|{_WHOLE}|{_COMMA}").all())
+    return bool(matches(text, f"{_POINT_THOUSANDS}|{_WHOLE}|{_COMMA}").all())
 
 
 def _parse_text_numbers(
     cells: pd.Series, decimal: str | None, units: bool
 ) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
     parsed = np.full(len(cells), np.nan)
-    bad = np.zeros(len(cells), bool)
     left = ~is_missing(cells)
-    of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+    of_text = are_strings(cells)
     for row in np.flatnonzero(left & ~of_text):
-        parsed[row], bad[row] = _parse_object(cells.iloc[row])
+        parsed[row] = _parse_object(cells.iloc[row])
     rows = np.flatnonzero(left & of_text)
     text = cells.iloc[rows].str.strip()
     text, unit = _without_unit(text) if units else (text, "")
@@ -227,32 +230,24 @@ def _parse_text_numbers(
         ",": f"{_COMMA}|{_POINT_THOUSANDS}|{_WHOLE}",
         ".": f"{_NUMBER}|{_COMMA_THOUSANDS}|{_BOTH}",
     }
-    readable = text.str.fullmatch(f"{forms.get(sign, _NUMBER)}|{_INFINITE}", case=False).to_numpy(
-        bool
-    )
+    readable = matches(text, f"{forms.get(sign, _NUMBER)}|{_INFINITE}")
     text = text[readable]
     count = int(text.str.contains(",", regex=False).sum()) if sign == "," else 0
     text = text.str.replace("." if sign == "," else ",", "", regex=False).str.replace(
         ",", ".", regex=False
     )
-    parsed[rows[readable]] = text.astype(np.float64)
-    # 1e999
-    overflows = np.isinf(parsed[rows[readable]]) & ~text.str.contains("inf", case=False).to_numpy(
-        bool
-    )
-    bad[rows[~readable]] = True
-    bad[rows[readable][overflows]] = True
-    findings = (
-        [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")]
-        if count
-        else []
-    )
-    findings += (
-        [Finding("units", len(text), f"numbers written with the unit {unit}: {len(text):,}")]
-        if unit
-        else []
-    )
-    return parsed, bad, findings
+    values = text.to_numpy(np.float64)
+    infinite = np.flatnonzero(np.isinf(values))
+    values[infinite[~matches(text.iloc[infinite], _INFINITE)]] = np.nan  # 1e999
+    parsed[rows[readable]] = values
+    findings = []
+    if count:
+        said = f"numbers written with a decimal comma: {count:,}"
+        findings.append(Finding("decimal comma", count, said))
+    if unit:
+        said = f"numbers written with the unit {unit}: {len(text):,}"
+        findings.append(Finding("units", len(text), said))
+    return parsed, left & np.isnan(parsed), findings
 
 
 def _without_unit(text: pd.Series) -> tuple[pd.Series, str]:
@@ -281,13 +276,10 @@ def _plain(text: pd.Series) -> pd.Series:
     """Rewrites numbers of other programs: blanks behind the sign, Fortran's exponents, and
     thousands that are apart by apostrophes or blanks.
     """
-    odd = text[~text.str.fullmatch(_NUMBER).to_numpy(bool)].str.replace(
-        r"^([+-])\s+(?=[\d.])", r"\1", regex=True
-    )
+    odd = text[~matches(text, _NUMBER)]
+    odd = odd.str.replace(r"^([+-])\s+(?=[\d.])", r"\1", regex=True)
     odd = odd.str.replace(r"(?<=[\d.])[dD](?=[+-]\d\d)", "e", regex=True)
-    odd = odd.mask(
-        odd.str.fullmatch(_GROUPED).to_numpy(bool), odd.str.replace(r"['\u2019\s]", "", regex=True)
-    )
+    odd = odd.mask(matches(odd, _GROUPED), odd.str.replace(r"['\u2019\s]", "", regex=True))
     return odd.reindex(text.index).fillna(text) if len(odd) else text
 
 
@@ -295,19 +287,17 @@ def _sign_of(text: pd.Series) -> str | None:
     """Returns the decimal sign that a column of text shows. None: points, and no commas that
     separate thousands.
     """
-    if text.str.fullmatch(_BOTH).any():
+    if matches(text, _BOTH).any():
         return "."
-    has_points = (
-        text[text.str.fullmatch(_NUMBER).to_numpy(bool)].str.contains(".", regex=False).any()
-    )
+    has_points = text[matches(text, _NUMBER)].str.contains(".", regex=False).any()
     return "," if shows_comma(text) and not has_points else None
 
 
-def _parse_object(cell: Any) -> tuple[float, bool]:
+def _parse_object(cell: Any) -> float:
     is_number = isinstance(cell, numbers.Real | decimal_module.Decimal) and not isinstance(
         cell, bool | np.bool_
     )
     try:
-        return (float(cell), False) if is_number else (np.nan, True)
+        return float(cell) if is_number else np.nan
     except (OverflowError, ValueError):  # an integer beyond float64, or a signalling NaN
-        return np.nan, True
+        return np.nan

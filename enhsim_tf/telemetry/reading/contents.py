@@ -9,6 +9,7 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import (
+    are_strings,
     has_commas,
     is_missing,
     is_plain,
@@ -108,11 +109,7 @@ def _kind_of(cells: pd.Series) -> str:
     for kind, classes in _OBJECTS.items():
         if isinstance(given.iloc[0], classes):
             return kind
-    text = (
-        given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)]
-        .astype("str")
-        .str.strip()
-    )
+    text = given[are_strings(given)].astype("str").str.strip()
     if len(text) == len(given) and (_are_hex(text) or _turn_hex(text, cells)):
         return "words"
     if not parse_numbers(given, "", drop=True, units=False)[1].all():

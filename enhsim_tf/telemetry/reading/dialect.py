@@ -48,6 +48,8 @@ class Dialect:
     units: Sequence[str] = ()  # cells of the line between the names and the data, where units stand
     may_lack_last: bool = False  # whether rows may leave out the last cell
     above: Sequence[str] = ()  # the lines above the data
+    file: str = ""  # its name
+    line: int = 1  # of the file, at which the data begin
 
 
 def utf8_of(content: bytes) -> tuple[bytes, list[Finding]]:
@@ -135,7 +137,10 @@ def find_dialect(text: str, name: str, options: Cleaning, separator: str | None 
             _refuse_header(found[0], name)
     _refuse_other_table(best, name, options.skip_rows)
     return dataclasses.replace(
-        best, names=[each or f"column {number}" for number, each in enumerate(best.names)]
+        best,
+        names=[each or f"column {number}" for number, each in enumerate(best.names)],
+        file=name,
+        line=best.first_line + options.skip_rows + 1,
     )
 
 

@@ -214,7 +214,8 @@ def read_excel(content: bytes, name: str, options: Cleaning) -> Table:
             text += f"; give --table for another: {', '.join(others)}" if others else ""
             findings.append(Finding("files", 1, text))
     else:
-        title = chosen_table(usable if options.table is None else sheets, name, options, first)
+        received = f"no numbers in the first sheet of {name}, {first}"
+        title = chosen_table(usable if options.table is None else sheets, name, options, received)
     rows = sheets[title][options.skip_rows :]
     width = max(
         (place + 1 for row in rows for place, cell in enumerate(row) if cell is not None), default=0
@@ -225,7 +226,7 @@ def read_excel(content: bytes, name: str, options: Cleaning) -> Table:
     with reading(name):
         dialect = find_dialect(text, name, options, "\t")
     frame = frame.iloc[dialect.first_line :].reset_index(drop=True).infer_objects()
-    return table_of(frame, dialect, name, None, findings, options.skip_rows)
+    return table_of(frame, dialect, None, findings)
 
 
 def _num_numeric(rows: Sequence[Sequence[Any]]) -> int:
@@ -339,16 +340,16 @@ def _of_arrays(
             f"Expected vectors or matrices of numbers. Received: {', '.join(others) or 'none'} in "
             f"{name}. Save them as variables of their own, or as CSV."
         )
-    lengths = [group for group, _ in tables]
+    groups = [group for group, _ in tables]
     firsts = [next(iter(columns)) for columns in tables.values()]
-    named = {
-        group
-        if group and lengths.count(group) == 1
-        else f"{group}/{first}"
-        if group and firsts.count(first) > 1
-        else first: (group, columns)
-        for ((group, _), columns), first in zip(tables.items(), firsts, strict=True)
-    }
+    named = {}
+    for (group, _), first, columns in zip(tables, firsts, tables.values(), strict=True):
+        title = first
+        if group and groups.count(group) == 1:
+            title = group
+        elif group and firsts.count(first) > 1:
+            title = f"{group}/{first}"
+        named[title] = (group, columns)
     group, chosen = named[chosen_table(named, name, options)]
     frame = pd.DataFrame({key: pd.Series(values) for key, values in chosen.items()})
     stated = {key: (units or {}).get(f"{group}/{key}".strip("/"), "") for key in frame}
@@ -368,16 +369,18 @@ def refuse_channels_first(shape: tuple[int, int], what: str) -> None:
 
 
 def chosen_table(
-    tables: Mapping[str, Any], name: str, options: Cleaning, first: str | None = None
+    tables: Mapping[str, Any], name: str, options: Cleaning, received: str = ""
 ) -> str:
-    """Returns the name of the table that is asked for, or of the only one."""
+    """Returns the name of the table that is asked for, or of the only one, unless `received` says
+    why that must be asked for.
+    """
     if options.table in tables:
         return options.table
-    if options.table is None and len(tables) == 1 and first is None:
+    if options.table is not None:
+        received = repr(options.table)
+    elif not received and len(tables) == 1:
         return next(iter(tables))
-    received = f"{len(tables)} in {name}" if options.table is None else repr(options.table)
-    if first is not None and options.table is None:
-        received = f"no numbers in the first sheet of {name}, {first}"
+    received = received or f"{len(tables)} in {name}"
     raise InputError(
         f"Expected one table. Received: {received}.", [{"table": each} for each in tables]
     )

@@ -19,6 +19,7 @@ from enhsim_tf.telemetry.cleaning.numbers import (
     allows_point_thousands,
     has_commas,
     is_text,
+    matches,
     shows_comma,
 )
 from enhsim_tf.telemetry.cleaning.options import Cleaning
@@ -63,19 +64,14 @@ class Table:
 
 
 def table_of(
-    frame: pd.DataFrame,
-    dialect: Dialect,
-    name: str,
-    decimal: str | None,
-    findings: Sequence[Finding],
-    skipped: int = 0,
+    frame: pd.DataFrame, dialect: Dialect, decimal: str | None, findings: Sequence[Finding]
 ) -> Table:
-    """Makes a table of the cells below the header of a file, above which lines were skipped."""
+    """Makes a table of the cells below the header of a file."""
     frame.columns = dialect.names
     units = dict(zip(dialect.names, dialect.units, strict=False))
     return Table(
         frame,
-        Places(((0, dialect.first_line + skipped + 1, name),)),
+        Places(((0, dialect.line, dialect.file),)),
         decimal,
         tuple(findings),
         units,
@@ -114,15 +110,14 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
             f"Expected rows below the header. Received: only names in {name}, "
             f"{', '.join(dialect.names[:4])}. Give a file with values."
         )
-    above = dialect.first_line + options.skip_rows
     frame = None
     with contextlib.suppress(_RaggedError):
-        frame, decimal = _read_rows(text, begin, dialect, name, options.decimal)
+        frame, decimal = _read_rows(text, begin, dialect, options.decimal)
     if frame is None or _may_be_ragged(frame, text, begin, dialect):
-        data, ragged = _without_ragged(text[begin:], dialect, above, name, options.drop_bad)
+        data, ragged = _without_ragged(text[begin:], dialect, options.drop_bad)
         findings += ragged
         if ragged or frame is None:
-            frame, decimal = _read_rows(data, 0, dialect, name, options.decimal)
+            frame, decimal = _read_rows(data, 0, dialect, options.decimal)
     if decimal == ",":
         findings.append(
             Finding(
@@ -131,10 +126,10 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 "the decimal sign of the file is a comma; points separate thousands",
             )
         )
-    repeated = _repeated_headers(frame, dialect.names, name, above)
+    repeated = _repeated_headers(frame, dialect)
     if repeated:
         frame = frame.drop(index=repeated).reset_index(drop=True)
-        lines = ", ".join(str(row + above + 1) for row in repeated[:3])
+        lines = ", ".join(str(row + dialect.line) for row in repeated[:3])
         findings.append(
             Finding(
                 "header lines",
@@ -143,8 +138,10 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
                 f"{lines})",
             )
         )
-    table = table_of(frame, dialect, name, decimal, findings, options.skip_rows)
-    behind_them = [(row - before, row + above + 2, name) for before, row in enumerate(repeated)]
+    table = table_of(frame, dialect, decimal, findings)
+    behind_them = [
+        (row - before, row + dialect.line + 1, name) for before, row in enumerate(repeated)
+    ]
     return dataclasses.replace(table, places=Places((*table.places.files, *behind_them)))
 
 
@@ -159,9 +156,7 @@ def _may_be_ragged(frame: pd.DataFrame, text: bytes, begin: int, dialect: Dialec
     )
 
 
-def _without_ragged(
-    data: bytes, dialect: Dialect, above: int, name: str, drop: bool
-) -> tuple[bytes, list[Finding]]:
+def _without_ragged(data: bytes, dialect: Dialect, drop: bool) -> tuple[bytes, list[Finding]]:
     """Empties lines that have another number of cells than the header, if they are to be dropped,
     or if it is the last, without an end; otherwise refuses them.
     """
@@ -180,13 +175,14 @@ def _without_ragged(
         first, _, cells = wrong[0]
         raise InputError(
             f"Expected {width} cells in a line, as in the header. Received: line "
-            f"{first + above + 1} has {cells}, in {name} ({len(wrong):,} such lines in all).",
+            f"{first + dialect.line} has {cells}, in {dialect.file} ({len(wrong):,} such lines in "
+            "all).",
             [{"drop_bad": True}],
             "a corrected file",
         )
     for begin, end, _ in wrong:
         lines[begin:end] = [""] * (end - begin)
-    where = tuple(f"line {begin + above + 1}" for begin, _, _ in wrong[:3])
+    where = tuple(f"line {begin + dialect.line}" for begin, _, _ in wrong[:3])
     text = f"lines with another number of cells than the header: {len(wrong):,}"
     if is_cut:
         text += "; the last line is cut off"
@@ -203,20 +199,20 @@ def _rows_of(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, i
 
 
 def _read_rows(
-    text: bytes, begin: int, dialect: Dialect, name: str, decimal: str | None
+    text: bytes, begin: int, dialect: Dialect, decimal: str | None
 ) -> tuple[pd.DataFrame, str | None]:
     """Reads the data, which begin at a place of the text, with the decimal sign that all columns
     allow; None if they do not show it.
     """
-    names = dialect.names
+    width = len(dialect.names)
     if dialect.separator == "," and text.find(b'"', begin) < 0:
         return _parse(text, begin, dialect, decimal), decimal  # no cell has a comma
-    head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
+    head = pd.DataFrame([(row + [""] * width)[:width] for row in dialect.head])
     sign = decimal or ("," if any(shows_comma(_some(head[column])) for column in head) else None)
     if dialect.separator == "," and decimal is None:
-        _refuse_flags(head, name)
+        _refuse_flags(head, dialect)
     if sign is None and dialect.separator == ";":
-        sign = _sign_of_country(head, names, name)
+        sign = _sign_of_country(head, dialect)
     frame = _parse(text, begin, dialect, sign)
     if sign is None and any(
         is_text(frame[column]) and shows_comma(_some(frame[column])) for column in frame
@@ -224,7 +220,7 @@ def _read_rows(
         sign = ","
         frame = _parse(text, begin, dialect, sign)
     if sign == "," and decimal is None:
-        _check_points(frame, names, name)
+        _check_points(frame, dialect)
     return frame, sign
 
 
@@ -233,50 +229,46 @@ def _some(cells: pd.Series) -> pd.Series:
     return cells.iloc[:: max(1, len(cells) // _LOOK)].dropna().astype("str").str.strip()
 
 
-def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str | None:
+def _sign_of_country(head: pd.DataFrame, dialect: Dialect) -> str | None:
     """Returns the comma where dates are written with points and all numbers with commas, as where
     the comma is the decimal sign.
     """
-    columns = [head[column].astype("str").str.strip() for column in head]
-    if not any(cells.str.fullmatch(r"\d\d?\.\d\d?\.\d{4}.*").any() for cells in columns):
+    if not any(matches(head[column], r"\d\d?\.\d\d?\.\d{4}.*").any() for column in head):
         return None
-    pointed = [
-        column
-        for column, cells in zip(head, columns, strict=True)
-        if cells.str.fullmatch(r"[+-]?\d+\.\d+").any()
-    ]
+    pointed = [column for column in head if matches(head[column], r"[+-]?\d+\.\d+").any()]
     if pointed and all(
-        allows_point_thousands(columns[column][columns[column] != ""]) for column in pointed
+        allows_point_thousands(head[column][head[column] != ""]) for column in pointed
     ):
         raise InputError(
             f"Expected a decimal sign that can be told. Received: {head[pointed[0]].iloc[0]!r} in "
-            f"{names[pointed[0]]!r} of {name}, where a point may separate thousands.",
+            f"{dialect.names[pointed[0]]!r} of {dialect.file}, where a point may separate "
+            "thousands.",
             SIGNS,
         )
-    return "," if not pointed and any(has_commas(cells) for cells in columns) else None
+    return "," if not pointed and any(has_commas(head[column]) for column in head) else None
 
 
-def _refuse_flags(head: pd.DataFrame, name: str) -> None:
+def _refuse_flags(head: pd.DataFrame, dialect: Dialect) -> None:
     """Refuses whole numbers with a digit behind a comma that hardly varies, as the flag of quality
     that weather services write behind a value.
     """
     cells = pd.concat([head[column] for column in head])
     behind = cells.str.extract(r"^[+-]?\d+,(\d+)$", expand=False).dropna()
-    found = cells[cells.str.fullmatch(r"[+-]?[1-9]\d{2,},\d").to_numpy(bool)]
+    found = cells[matches(cells, r"[+-]?[1-9]\d{2,},\d")]
     if (
         len(found) >= _FEWEST_FLAGS
         and set(behind.str.len()) == {1}
         and behind.nunique() <= _MAX_FLAGS
     ):
         raise InputError(
-            f"Expected one number in each cell. Received: {found.iloc[0]!r} in {name}, which may "
-            "be a number and a flag.",
+            f"Expected one number in each cell. Received: {found.iloc[0]!r} in {dialect.file}, "
+            "which may be a number and a flag.",
             (),
             "values and flags in columns of their own, or --decimal , if it is a decimal",
         )
 
 
-def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
+def _check_points(frame: pd.DataFrame, dialect: Dialect) -> None:
     """Refuses numbers with decimal points in one column of a file that has decimal commas in
     others.
     """
@@ -284,11 +276,12 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
         if not is_text(frame[column]):
             continue
         cells = _some(frame[column])
-        points = cells[cells.str.fullmatch(r"[+-]?\d+\.\d+").to_numpy(bool)]
+        points = cells[matches(cells, r"[+-]?\d+\.\d+")]
         if len(points) > len(cells) / 2 and not allows_point_thousands(points):
             raise InputError(
-                f"Expected one decimal sign in all columns. Received: a point in {names[column]!r} "
-                f"({points.iloc[0]}), commas in others, in {name}.",
+                "Expected one decimal sign in all columns. Received: a point in "
+                f"{dialect.names[column]!r} ({points.iloc[0]}), commas in others, in "
+                f"{dialect.file}.",
                 SIGNS,
             )
 
@@ -333,12 +326,11 @@ def _parse(text: bytes, begin: int, dialect: Dialect, decimal: str | None) -> pd
     return frame
 
 
-def _repeated_headers(
-    frame: pd.DataFrame, names: Sequence[str], name: str, above: int
-) -> list[int]:
+def _repeated_headers(frame: pd.DataFrame, dialect: Dialect) -> list[int]:
     """Returns the numbers of the rows that repeat the names, as in files that were joined, or that
     WinCC writes where it stops (`$RT_OFF$`); refuses a header with others or in another order.
     """
+    names = dialect.names
     place = next((number for number, each in enumerate(names) if each[:7] != "column "), 0)
     first = frame.iloc[:, place]
     if not is_text(first):
@@ -358,7 +350,7 @@ def _repeated_headers(
         ):
             raise InputError(
                 f"Expected one order of columns. Received: {', '.join(cells)[:60]} at line "
-                f"{row + above + 1} of {name}, below {', '.join(names)[:60]}.",
+                f"{row + dialect.line} of {dialect.file}, below {', '.join(names)[:60]}.",
                 otherwise="the parts one by one",
             )
     return rows
