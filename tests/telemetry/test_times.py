@@ -55,6 +55,7 @@ def test_the_form_of_dates(text, form):
 
 
 class Log:
+    channel = "volts"
     counts = False
 
     def place(self, number):
@@ -64,7 +65,7 @@ class Log:
 def refuse_minutes(minutes, order=1, has_zone=False):
     """Refuses rows in another order than that of their times if their clock steps back."""
     times = 60 * 10**9 * np.array(minutes)[::order]
-    refuse_steps_back(times, np.arange(len(minutes))[::order], Log(), "volts", has_zone)
+    refuse_steps_back(times, np.arange(len(minutes))[::order], Log(), has_zone)
 
 
 @pytest.mark.parametrize("minutes", [[0, 20, 40, 60, 0, 20, 40], [0, 20, 20, 40, 60, 0, 20, 40]])

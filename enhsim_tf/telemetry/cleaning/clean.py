@@ -107,7 +107,7 @@ def clean(
             "a time column, or leave it out."
         )
     else:
-        log = CleaningLog(list(raw.findings), raw.places)
+        log = CleaningLog(raw.name, list(raw.findings), raw.places)
         found = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
         log.findings.insert(0, found)
         first = raw.first * UNITS_NS["s"]
@@ -115,7 +115,7 @@ def clean(
         rows = pd.DataFrame({"time": numbers * UNITS_NS["s"], "value": values, "row": numbers})
     log.findings.extend(noted)
 
-    parts, used, interval = regularise(rows, bad, log, raw.name, options)
+    parts, used, interval = regularise(rows, bad, log, options)
     if describe:
         describe_values(parts, values[np.isfinite(values)], log)
 
@@ -127,7 +127,7 @@ def clean(
             Part(
                 part.values.astype(np.float32)[:, None],
                 (part.begin - begin) / 1e9,
-                measured=None if part.measured.all() else part.measured[:, None],
+                measured=part.measured[:, None],
             )
             for part in parts
         ),
@@ -188,7 +188,7 @@ def _rows_with_times(
     ordered = _in_order(raw.times, options.timezone if local else None)
     times = ordered.of_all
     has_all = len(ordered.rows) == len(times)
-    log = CleaningLog(list(raw.findings), raw.places, times, counts)
+    log = CleaningLog(raw.name, list(raw.findings), raw.places, times, counts)
     if not has_all:
         bad = raw.times.bad
         had_time = raw.times.stamps.notna()
@@ -219,7 +219,7 @@ def _rows_with_times(
         rows = np.flatnonzero(has_time & ~twice & np.isfinite(values))
         is_told = not local or options.timezone is not None
         if counts or not is_told or options.same_time != "last":  # which corrects earlier rows
-            refuse_steps_back(times[rows], rows, log, raw.name, is_told)
+            refuse_steps_back(times[rows], rows, log, is_told)
         early = np.flatnonzero(has_time & (times < np.maximum.accumulate(times)))
         log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     if local:

@@ -46,7 +46,7 @@ class Part:
 
 
 def regularise(
-    rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning
+    rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, options: Cleaning
 ) -> tuple[list[Part], int, float]:
     """Turns rows into regular parts.
 
@@ -55,7 +55,6 @@ def regularise(
             or infinite where it is missing, and `row`, their number in the source.
         bad: Which rows of the source have a value that cannot be read.
         log: Receives what is found.
-        name: Of the channel, for messages.
         options: How problems are treated.
 
     Returns:
@@ -68,7 +67,7 @@ def regularise(
     if is_plain and options.interval_s in (None, step / 1e9):  # nothing to be done
         part = Part(0.0, values, rows["row"].to_numpy(), np.ones(len(rows), bool))
         return [part], len(rows), float(step)
-    rows = _drop_duplicate_times(_drop_missing_values(rows, bad, log, name), log, name, options)
+    rows = _drop_duplicate_times(_drop_missing_values(rows, bad, log), log, options)
     times = rows["time"].to_numpy()
     holds = options.fill == "hold"
     by_interval = options.interval_s is not None or holds
@@ -78,7 +77,8 @@ def regularise(
         interval = options.interval_s * 1e9
     elif len(rows) < 2:
         raise InputError(
-            f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}.",
+            "Expected at least 2 rows to infer the interval. Received: 1 usable row from "
+            f"{log.channel}.",
             otherwise="telemetry with more rows",
         )
     else:
@@ -91,7 +91,7 @@ def regularise(
             raise InputError(
                 "Expected roughly regular times. Received: steps from "
                 f"{steps.min() / 1e9:g} s to {steps.max() / 1e9:g} s without a common interval, in "
-                f"{name}.",
+                f"{log.channel}.",
                 [rounded, rounded | {"fill": "hold"}],
                 "--fill hold for telemetry that is sent only when it changes",
             )
@@ -119,7 +119,7 @@ def regularise(
             )
     rows, begins = _on_grids(rows, interval, options.longest_gap + 1, by_interval)
     how = "last" if holds else "mean" if by_interval else options.same_time
-    return *_build_parts(rows, begins, interval, log, name, how, options), interval
+    return *_build_parts(rows, begins, interval, log, how, options), interval
 
 
 def find_interval(times: np.ndarray) -> float:
@@ -202,35 +202,24 @@ def _have_other_rate(times: np.ndarray, interval: float) -> np.ndarray:
     return marks
 
 
-def _drop_missing_values(
-    rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog, name: str
-) -> pd.DataFrame:
+def _drop_missing_values(rows: pd.DataFrame, bad: np.ndarray, log: CleaningLog) -> pd.DataFrame:
     """Drops rows without a finite value."""
     has_value = np.isfinite(rows["value"])
     missing = rows["row"][~has_value].to_numpy()
-    for kind, numbers, text in (
-        (
-            "bad values",
-            missing[bad[missing]],
-            "values that cannot be read, taken as missing: {count}",
-        ),
-        (
-            "missing values",
-            missing[~bad[missing]],
-            "rows without a value (NaN, infinite or empty), taken as gaps: {count}",
-        ),
-    ):
-        log.add(kind, numbers, text)
+    is_bad = bad[missing]
+    text = "values that cannot be read, taken as missing: {count}"
+    log.add("bad values", missing[is_bad], text)
+    text = "rows without a value (NaN, infinite or empty), taken as gaps: {count}"
+    log.add("missing values", missing[~is_bad], text)
     if not has_value.any():
         raise InputError(
-            f"Expected values. Received: only missing ones in {name}. Choose another channel."
+            f"Expected values. Received: only missing ones in {log.channel}. Choose another "
+            "channel."
         )
     return rows[has_value]
 
 
-def _drop_duplicate_times(
-    rows: pd.DataFrame, log: CleaningLog, name: str, options: Cleaning
-) -> pd.DataFrame:
+def _drop_duplicate_times(rows: pd.DataFrame, log: CleaningLog, options: Cleaning) -> pd.DataFrame:
     """Keeps one row for each time. A mean that would merge most rows must be asked for, by an
     interval.
     """
@@ -247,7 +236,7 @@ def _drop_duplicate_times(
         and 4 * len(left) >= len(rows) > 3
     ):
         raise ClockError(
-            f"Expected a time for each row. Received: {len(rows):,} rows of {name} with "
+            f"Expected a time for each row. Received: {len(rows):,} rows of {log.channel} with "
             f"{len(kept):,} different times, as of several series, or of a clock that lost digits.",
             [{"interval_s": float(f"{np.median(np.diff(kept['time'])) / 1e9:.6g}")}]
             if len(kept) > 1
@@ -355,7 +344,6 @@ def _build_parts(
     begins: np.ndarray,
     interval: float,
     log: CleaningLog,
-    name: str,
     how: str,
     options: Cleaning,
 ) -> tuple[list[Part], int]:
@@ -366,7 +354,7 @@ def _build_parts(
     if (longest := lengths.max()) < options.min_part:
         raise InputError(
             f"Expected regular samples, at least {options.min_part} in a row. Received: {longest} "
-            f"at most, every {interval / 1e9:.6g} s, in {name}.",
+            f"at most, every {interval / 1e9:.6g} s, in {log.channel}.",
             [
                 {"max_fill": 10 * max(1, options.longest_gap)},
                 *(

@@ -194,6 +194,7 @@ def _alike(
 class CleaningLog:
     """The log of cleaning actions: collects findings with their places in the source."""
 
+    channel: str
     findings: list[Finding]  # those made while reading come first
     places: Places = ROWS
     # of all rows in the order of the source, int64 nanoseconds since 1970; None without a clock

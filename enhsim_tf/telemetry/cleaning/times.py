@@ -161,16 +161,16 @@ class _Reader:
         # the time is too far in the future or past to be converted to its zone
         except (NotImplementedError, OverflowError, ValueError):
             received = "a time out of range"
+        # samples can be counted where a column of times is read
+        options = [{"time": "none"}] if self.places.files else []
+        if 2 * bad.sum() < len(bad):
+            options = [{"drop_bad": True}]
         raise InputError(
             f"Expected {expected}. Received: {received} at {self.places.of(row)} of {self.what} "
             f"({int(bad.sum()):,} in all).",
-            [{"drop_bad": True}] if 2 * bad.sum() < len(bad) else self.counting(),
+            options,
             otherwise,
         )
-
-    def counting(self) -> list[dict[str, str]]:
-        """The option of counting the samples, where a column of times is read."""
-        return [{"time": "none"}] if self.places.files else []
 
     def of_dates(self, times: pd.Series) -> Times:
         stamps = pd.DatetimeIndex(times)
@@ -533,7 +533,7 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
 
 
 def refuse_steps_back(
-    times: np.ndarray, rows: np.ndarray, log: CleaningLog, name: str, has_zone: bool
+    times: np.ndarray, rows: np.ndarray, log: CleaningLog, has_zone: bool
 ) -> None:
     """Refuses times that step back where sorting would mix what happened at different times.
 
@@ -549,9 +549,8 @@ def refuse_steps_back(
     if np.median(steps) < 0:  # the latest comes first
         times, rows, steps = times[::-1], rows[::-1], -steps[::-1]
     hour = UNITS_NS["h"]
-    counting = [{"time": "none"}]
-    options = [{"timezone": "UTC"}]
-    otherwise = "the zone of the clock, as Europe/Berlin"
+    options = [{"time": "none"}]
+    otherwise = "the parts one by one"
     usual = np.median(np.abs(steps))
     back = np.flatnonzero(steps < 0)
 
@@ -567,8 +566,6 @@ def refuse_steps_back(
             & (times[1:-1] <= np.minimum.accumulate(times)[:-2] + late)
         )
         how = "count from zero and begin again, as after a restart"
-        options = counting
-        otherwise = "the parts one by one"
     else:
         is_change = are(hour)
         if usual >= hour / 2:  # a late row is no step back by an hour only on a Sunday morning
@@ -579,9 +576,10 @@ def refuse_steps_back(
             back = changes if is_change else back
         if is_change and not has_zone:
             how = "state no zone and repeat one hour, as local clocks do"
+            options = [{"timezone": "UTC"}]
+            otherwise = "the zone of the clock, as Europe/Berlin"
         elif are(UNITS_NS["D"]) and len(np.unique(times)) == len(times) and not has_zone:
             how = "step back by one day, as where a date stays past midnight"
-            options = counting
             otherwise = "the right dates, or --timezone if these are right"
         elif (
             are(12 * hour)
@@ -589,18 +587,15 @@ def refuse_steps_back(
             and pd.DatetimeIndex(times).hour.isin(range(1, 13)).all()
         ):
             how = "step back by half a day, as hours from 1 to 12 do"
-            options = counting
             otherwise = "times with AM or PM"
         else:
             back = [] if is_change else jumps_back(times)
             how = "go back and cover the same time once more, as where a clock was set"
-            options = counting
-            otherwise = "the parts one by one"
             otherwise += ", or same_time='last' if rows correct earlier ones" if has_zone else ""
     if len(back):
         raise ClockError(
             f"Expected ascending times. Received: times that {how}, at "
-            f"{log.place(rows[back[0] + 1])} of {name}.",
+            f"{log.place(rows[back[0] + 1])} of {log.channel}.",
             options,
             otherwise,
         )
