@@ -262,6 +262,15 @@ LATER = {
         ),
         NIGHT[0],
     ),
+    "the day of the year, and milliseconds behind a time of day": (
+        table(
+            "Year,DOY,HHMMSS,ms,v",
+            *(NIGHT.strftime(form) for form in ("%Y", "%j", "%H%M%S")),
+            [500] * N,
+            VALUES,
+        ),
+        NIGHT[0] + pd.Timedelta("500ms"),
+    ),
     "ISO 8601 with a comma": (
         timed("time;v", "%Y-%m-%d %H:%M:%S,500", ";"),
         "2024-03-01T00:00:00.5Z",

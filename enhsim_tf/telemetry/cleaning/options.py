@@ -15,6 +15,16 @@ UNITS_NS = {
     "us": 10**3,
     "ns": 1,
 }
+UNITS = {
+    "D": "days d day tage",
+    "h": "hours h hr hrs hour stunden",
+    "min": "minutes min mins minute minuten",
+    "s": "seconds s sec secs second sekunden",
+    "ms": "milliseconds ms msec msecs millis millitm millisecond",
+    "us": "microseconds us \u00b5s \u03bcs usec usecs micros microsecond",
+    "ns": "nanoseconds ns nsec nsecs nanos nanosecond",
+}
+"""The words of each unit, its name first."""
 DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_529.0}
 """Kinds of days and their number of 1970-01-01: spreadsheets, modified Julian dates, Julian dates,
 MATLAB.

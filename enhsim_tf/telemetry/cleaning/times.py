@@ -24,18 +24,9 @@ from enhsim_tf.telemetry.cleaning.numbers import (
     is_text,
     parse_numbers,
 )
-from enhsim_tf.telemetry.cleaning.options import DAYS, UNITS_NS
+from enhsim_tf.telemetry.cleaning.options import DAYS, UNITS, UNITS_NS
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Places
 
-UNIT_NAMES = {
-    "D": "days",
-    "h": "hours",
-    "min": "minutes",
-    "s": "seconds",
-    "ms": "milliseconds",
-    "us": "microseconds",
-    "ns": "nanoseconds",
-}
 _DAY_NAMES = {
     "excel": "days of spreadsheets",
     "mjd": "modified Julian dates",
@@ -56,6 +47,16 @@ DURATION = (
 _ISO = "ISO8601"
 _COMPACT = {7: "%Y%j", 8: "%Y%m%d", 10: "%Y%m%d%H", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 _ANY_DATE = r"\d{1,4}[./-]\d\d?[./-]\d{1,4} "
+_REWRITTEN = {
+    # of an interval, the start is kept
+    r"^(\d{4}-\d\d-\d\dT[^/]*)/.*": r"\1",
+    rf"^({_ANY_DATE}.*:\d\d) - {_ANY_DATE}.*": r"\1",
+    r"^(\d{8}):(\d{4})$": r"\1T\2",
+    r"(:\d\d),(\d)": r"\1.\2",  # decimal commas in seconds
+    r" ?(?:UTC|GMT)$": "+00:00",
+    r"(?<=[T :])(\d)(?=:\d|\.\d|$)": r"0\1",  # a time of day without leading zeros
+    r"([AaPp])\. ?[Mm]\.?$": r"\1M",
+}
 _MIDNIGHT = r"(?<=[T ])24(?=:00)"  # at the end of a day
 LOOK = 200  # number of cells that are inspected to find a form
 _MAX_JUMPS = 100  # above which times are in no order
@@ -95,6 +96,11 @@ class Times:
         """The times of some rows."""
         return dataclasses.replace(self, stamps=self.stamps[rows], bad=self.bad[rows])
 
+    @property
+    def seconds(self) -> np.ndarray:
+        """The times in seconds, NaN where they are missing."""
+        return np.where(self.stamps.isna(), np.nan, self.stamps.as_unit("ns").asi8 / 1e9)
+
 
 def parse_times(
     times: Any, what: str, drop: bool = False, form: str | None = None, places: Places = ROWS
@@ -109,7 +115,7 @@ def parse_times(
         form: How they are written, see `Cleaning.time_format`. None: detected.
         places: Where the rows are in their file, for messages.
     """
-    times = as_column(times, what)
+    times = as_column(times, what).infer_objects()  # such as time spans
     reader = _Reader(what, drop, places)
     if isinstance(times.dtype, pd.PeriodDtype):
         times = times.dt.start_time
@@ -212,7 +218,7 @@ class _Reader:
         is_epoch = bool(usable.any()) and bool(
             form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9
         )
-        form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
+        form = form or f"{UNITS[unit].split()[0]} since {'1970' if is_epoch else 'zero'}"
         stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
         return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
 
@@ -227,9 +233,6 @@ class _Reader:
                 return self.of_dates(
                     pd.Series(pd.to_datetime(text, utc=bool(aware), errors="coerce"))
                 )
-            if len(given) and given.map(lambda cell: isinstance(cell, datetime.timedelta)).all():
-                spans = pd.to_timedelta(text, errors="coerce")
-                return self.of_numbers(spans.dt.total_seconds(), "s")
             text = text.map(
                 lambda cell: (
                     str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None
@@ -462,19 +465,11 @@ def _end(found: re.Match) -> str:
 
 
 def _plain(text: pd.Series) -> pd.Series:
-    """Rewrites what no parser takes: decimal commas in seconds, UTC in words, times of day without
-    leading zeros, and intervals, of which the start is kept.
-    """
-    return (
-        text.str.strip()
-        .str.replace(r"^(\d{4}-\d\d-\d\dT[^/]*)/.*", r"\1", regex=True)
-        .str.replace(rf"^({_ANY_DATE}.*:\d\d) - {_ANY_DATE}.*", r"\1", regex=True)
-        .str.replace(r"^(\d{8}):(\d{4})$", r"\1T\2", regex=True)
-        .str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True)
-        .str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
-        .str.replace(r"(?<=[T :])(\d)(?=:\d|\.\d|$)", r"0\1", regex=True)
-        .str.replace(r"([AaPp])\. ?[Mm]\.?$", r"\1M", regex=True)
-    )
+    """Rewrites what no parser takes, see `_REWRITTEN`."""
+    text = text.str.strip()
+    for pattern, plain in _REWRITTEN.items():
+        text = text.str.replace(pattern, plain, regex=True)
+    return text
 
 
 def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:

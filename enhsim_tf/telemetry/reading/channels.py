@@ -266,14 +266,15 @@ def _channel(
     """Makes one raw channel."""
     places = layout.places
     times = layout.times
+    labels = layout.left_out.get("labels", ())
     findings = list(layout.findings)
     frame = layout.frame
     if rows is not None:
-        frame = frame[[column, *layout.labels]].iloc[rows]
+        frame = frame[[column, *labels]].iloc[rows]
         places = Places(places.files, rows)
         times = None if times is None else times.at(rows)
     cells = frame[column].reset_index(drop=True)
-    for label in (label for label in layout.labels if _concerns(label, column, layout)):
+    for label in (label for label in labels if _concerns(label, column, layout)):
         mask = anomalous(frame[label])
         if mask is None:
             said = ", ".join(map(str, frame[label].dropna().unique()[:4]))

@@ -26,11 +26,9 @@ from enhsim_tf.telemetry.cleaning.times import (
 from enhsim_tf.telemetry.reading.clock_parts import (
     Clock,
     are_days,
-    clock_of_fractions,
     clock_of_parts,
-    joined_clock,
+    clocks_of_fractions,
     parts_of,
-    seconds_and_fractions,
     with_times_of_day,
 )
 from enhsim_tf.telemetry.reading.clock_values import (
@@ -42,6 +40,7 @@ from enhsim_tf.telemetry.reading.clock_values import (
     is_regular,
     may_count,
     shows_time,
+    steps_of,
 )
 from enhsim_tf.telemetry.reading.column_names import (
     BESIDE,
@@ -76,11 +75,6 @@ _ZONE_COLUMN = re.compile(
 )
 
 
-def _seconds_of(spans: pd.Series) -> np.ndarray:
-    stamps = parse_times(spans, "", drop=True).stamps
-    return np.where(stamps.isna(), np.nan, stamps.as_unit("ns").asi8 / 1e9)
-
-
 def find_clock(table: Contents) -> Clock:
     """Finds the clock of a table; refuses one in which several columns may be it, or one of which
     only the values speak for it.
@@ -100,7 +94,7 @@ def find_clock(table: Contents) -> Clock:
     ]
     table = with_times_of_day(table, dates or compact)
     numbers = table.numbers
-    if (joined := joined_clock(table, dates or compact)) is not None:
+    if (joined := clock_of_parts(table, dates or compact)) is not None:
         return joined
     dates = [name for name in dates if tells[name]] or dates
     if dates and frame[dates[0]].iloc[: 50 * LOOK].duplicated().mean() > _OFTEN:
@@ -109,18 +103,23 @@ def find_clock(table: Contents) -> Clock:
         return _one_of(table, dates)
     if (parts := clock_of_parts(table)) is not None:
         return parts
-    fractions = seconds_and_fractions(numbers)
+    of_fractions = clocks_of_fractions(numbers)
+    taken = {name for clock in of_fractions for name in clock.columns}
     may_be = {
         name: values
         for name, values in numbers.items()
-        if name not in sum(fractions, ()) and _may_be_clock(tells[name], values)
+        if name not in taken and _may_be_clock(name, values)
     }
-    spans = [name for name in table.of_kind("spans") if may_count(_seconds_of(frame[name]))]
+    spans = [
+        name
+        for name in table.of_kind("spans")
+        if may_count(parse_times(frame[name], "", drop=True).seconds)
+    ]
     if spans and all(tells[name] < 2 for name in may_be):
         span = max(spans, key=lambda name: tells[name])
         return Clock((span,), frame[span])
-    if fractions and not may_be:
-        return clock_of_fractions(numbers, fractions[0])
+    if of_fractions and not may_be:
+        return of_fractions[0]
     if may_be:
         clocks = _clearest(may_be, tells)
         is_plain = not is_epoch(numbers[clocks[0]]) and name_tells(clocks[0])[1] is None
@@ -183,10 +182,9 @@ def _refuse_apart_times(table: Contents, day: str) -> None:
     days = table.frame[day]
     for name, kind in table.kinds.items():
         if name in table.numbers and name_tells(name)[0] == 2:
-            values = table.numbers[name][np.isfinite(table.numbers[name])]
+            values = table.numbers[name]
             is_apart = name_tells(name)[1] is None and may_be_time_of_day(values)
-            is_finer = (np.diff(values) > 0).all() and days.nunique() > 1
-            if is_finer:
+            if (steps_of(values) > 0).all() and days.nunique() > 1:
                 _one_of(table, [day, name])
         else:
             cells = first_cells(table.frame[name])
@@ -207,8 +205,9 @@ def _refuse_apart(
     )
 
 
-def _may_be_clock(tells: int, values: np.ndarray) -> bool:
-    return tells > 0 and (is_increasing(values) or is_epoch(values) or is_regular(values[::-1]))
+def _may_be_clock(name: str, values: np.ndarray) -> bool:
+    is_named = name_tells(name)[0] > 0
+    return is_named and (is_increasing(values) or is_epoch(values) or is_regular(values[::-1]))
 
 
 def _one_of(table: Contents, names: list[str]) -> Clock:
@@ -247,7 +246,7 @@ def _refuse_unknown(table: Contents) -> None:
         )
     ramp = next(iter(ramps), next(in_order, None))
     if ramp is not None and len(table.of_kind("numbers")) > 1:
-        step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
+        step = float(np.median(steps_of(numbers[ramp])))
         named = [
             name
             for name, values in numbers.items()
@@ -374,7 +373,10 @@ def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:
     clocks = {
         name
         for name in frame
-        if kinds[name] == "dates" or name in numbers and _is_named_clock(name, numbers[name])
+        if kinds[name] == "dates"
+        or name in numbers
+        and name_tells(name)[0] == 2
+        and _may_be_clock(name, numbers[name])
     }
     groups = _signals_of(kinds, clocks)
     behind = {
@@ -428,10 +430,6 @@ def _signals_of(kinds: Mapping[str, str], clocks: Collection[str]) -> dict[str, 
     return groups if len(groups) > 1 and all(groups.values()) else {}
 
 
-def _is_named_clock(name: str, values: np.ndarray) -> bool:
-    return name_tells(name)[0] == 2 and _may_be_clock(2, values[np.isfinite(values)])
-
-
 def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[str]:
     """Returns the columns that show the time once more, or show it although samples are counted."""
     numbers = table.numbers
@@ -441,17 +439,13 @@ def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[st
         parts = clock_of_parts(table) or Clock()
         return found.union(
             parts.columns,
-            (
-                name
-                for name, values in numbers.items()
-                if _may_be_clock(name_tells(name)[0], values)
-            ),
+            (name for name, values in numbers.items() if _may_be_clock(name, values)),
         )
     for part, name in parts_of(numbers).items():
         values = getattr(times.stamps, part, None)
         if values is not None and values.nunique() > 1 and (values == numbers[name]).mean() > 0.9:
             found.add(name)
-    known = np.where(times.stamps.isna(), np.nan, times.stamps.as_unit("ns").asi8.astype(float))
+    seconds = times.seconds
     for name, values in numbers.items():
         words = set(words_of(name))
         is_named = name_tells(name)[0] > 0 or words and words <= BESIDE.union(UNIT_OF)
@@ -459,7 +453,7 @@ def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[st
         if (
             name not in clock.columns
             and (is_named or is_epoch(values))
-            and shows_time(known, values)
+            and shows_time(seconds, values)
         ):
             found.add(name)
     return found

@@ -4,16 +4,17 @@ and hours, seconds and their fractions.
 
 import dataclasses
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.options import UNITS
 from enhsim_tf.telemetry.cleaning.times import may_be_time_of_day, parse_times
 from enhsim_tf.telemetry.reading.clock_values import are_whole
-from enhsim_tf.telemetry.reading.column_names import UNIT_OF, UNITS, without_ends, words_of
+from enhsim_tf.telemetry.reading.column_names import UNIT_OF, without_ends, words_of
 from enhsim_tf.telemetry.reading.contents import Contents, different, first_cells
 
 _PARTS = {
@@ -76,125 +77,113 @@ def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
     )
 
 
-def joined_clock(table: Contents, dates: list[str]) -> Clock | None:
-    """Returns the clock that a column of dates and columns of the time of day, in text or whole
-    numbers, make together, or None.
+def clock_of_parts(table: Contents, dates: Sequence[str] = ()) -> Clock | None:
+    """Returns the clock that days and columns of the time of day, in text or whole numbers, make
+    together, or None. The days are those of the one column of `dates`; without any, those of
+    columns for the year, the month and day or the day of year, which need no time of day.
     """
     frame = table.frame
-    hours = different(frame, without_ends(table.of_kind("times of day")))
-    if len(dates) != 1 or len(hours) > 1:
+    numbers = table.numbers
+    parts = parts_of(numbers)
+    of_days, cells = _days_of(table, dates, parts)
+    texts = different(frame, without_ends(table.of_kind("times of day")))
+    if cells is None or len(texts) > 1:
         return None
-    cells = frame[dates[0]]
-    if dates[0] in table.numbers:
-        text = table.numbers[dates[0]].astype(np.int64).astype(str)
-        cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
+    of_day = _among(parts, _MOST)
+    beside = _among(parts, _FRACTIONS)
+    second = of_day.get("second")
     is_day = are_days(cells)
-    parts = _parts_beside(table, cells, hours, is_day)
-    texts: list[str] = []
-    if hours and is_day:
-        halves = [
+    if texts and is_day and (dates or of_day.keys() <= _FRACTIONS.keys()):
+        has_minutes = first_cells(frame[texts[0]]).str.fullmatch(r" *\d\d?:\d\d *").all()
+        if second and has_minutes and np.nanmax(numbers[second]) <= _MOST["second"]:
+            beside = {"second": second} | beside
+        texts += [
             name
             for name in table.of_kind("words")
             if frame[name].dropna().isin(["AM", "PM", "am", "pm"]).all()
         ]
-        texts = [*hours, *halves]
-        cells = _with_texts(cells, frame[texts])
-    added = _added(table.numbers, parts)
-    if parts and parts.keys() <= _FRACTIONS.keys() and not _makes_alike(cells, added):
-        parts, added = {}, None
-    columns = (dates[0], *texts, *parts.values())
+        # a date may stand in the first row of each day only
+        cells = _with_texts(cells.ffill() if dates else cells, frame[texts])
+    else:
+        texts = []
+        if not dates or is_day and "hour" in of_day:
+            # what is smaller than a second belongs to one
+            beside = of_day if second else _among(of_day, of_day.keys() - beside.keys())
+        elif is_day or not _have_seconds(cells):
+            beside = {}
+    added = _added(numbers, beside)
+    if beside and beside.keys() <= _FRACTIONS.keys() and not _makes_alike(cells, added):
+        beside, added = {}, None
+    columns = (*of_days, *texts, *beside.values())
     return Clock(columns, cells, added) if len(columns) > 1 else None
 
 
-def _parts_beside(
-    table: Contents, dates: pd.Series, hours: Sequence[str], is_day: bool
-) -> dict[str, str]:
-    """Returns the columns of whole numbers by the parts of the time that they add to dates, or to
-    dates and times of day.
-    """
-    parts = {part: name for part, name in parts_of(table.numbers).items() if part in _MOST}
-    fractions = {part: name for part, name in parts.items() if part in _FRACTIONS}
-    if hours and is_day:
-        has_minutes = first_cells(table.frame[hours[0]]).str.fullmatch(r" *\d\d?:\d\d *").all()
-        second = parts.get("second")
-        if second and has_minutes and np.nanmax(table.numbers[second]) <= _MOST["second"]:
-            return {"second": second} | fractions
-        return fractions
-    if is_day and "hour" in parts:
-        # what is smaller than a second belongs to one
-        return {
-            part: name for part, name in parts.items() if part not in fractions or "second" in parts
-        }
+def _among(parts: Mapping[str, str], kinds: Collection[str]) -> dict[str, str]:
+    """Returns the columns of parts of these kinds."""
+    return {part: name for part, name in parts.items() if part in kinds}
+
+
+def _have_seconds(dates: pd.Series) -> bool:
+    """Whether dates are written with whole seconds."""
     has_zone = isinstance(dates.dtype, pd.DatetimeTZDtype)  # far dates have no text with one
     head = first_cells(dates.dt.tz_convert(None) if has_zone else dates)
-    has_seconds = head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all()
-    return fractions if not is_day and has_seconds else {}
+    return bool(head.str.fullmatch(r".*:\d\d:\d\d(?:Z|[+-]\d\d:?\d\d)?").all())
+
+
+def _days_of(
+    table: Contents, dates: Sequence[str], parts: Mapping[str, str]
+) -> tuple[Sequence[str], pd.Series | None]:
+    """Returns the columns that hold the days of a clock, and the days; None if it has none."""
+    numbers = table.numbers
+    if len(dates) == 1:
+        cells = table.frame[dates[0]]
+        if dates[0] in numbers:
+            text = numbers[dates[0]].astype(np.int64).astype(str)
+            cells = pd.Series(pd.to_datetime(text, format="%Y%m%d"))
+        return dates, cells
+    of_days = _among(parts, _PARTS.keys() - _MOST.keys())
+    if dates or "year" not in of_days or of_days.keys().isdisjoint(("month", "day_of_year")):
+        return (), None
+    years = numbers[of_days["year"]]
+    if not are_whole(years[np.isfinite(years)], 1900, 2200):
+        return (), None
+    days = {"year": years, "month": 1.0, "day": 1.0}
+    if "day_of_year" not in of_days:
+        days |= {part: numbers[name] for part, name in of_days.items()}
+    stamps = pd.to_datetime(pd.DataFrame(days), errors="coerce").astype("datetime64[ns]")
+    added = _added(numbers, of_days)
+    return tuple(of_days.values()), stamps if added is None else stamps + added
 
 
 def _with_texts(dates: pd.Series, texts: pd.DataFrame) -> pd.Series:
     """Returns dates with what stands beside them in text."""
     if pd.api.types.is_datetime64_any_dtype(dates.dtype):
         dates = dates.dt.strftime("%Y-%m-%d")
-    # a date may stand in the first row of each day only
-    cells = dates.astype("str").str.strip().ffill()
+    cells = dates.astype("str").str.strip()
     for name in texts:
         cells = cells + " " + texts[name].astype("str").str.strip()
     return cells
 
 
-def clock_of_parts(table: Contents) -> Clock | None:
-    """Returns the clock of columns for the year, the month and day or the day of year, and perhaps
-    the time of day, or None.
-    """
-    numbers = table.numbers
-    parts = parts_of(numbers)
-    if not {"day_of_year", "month"} & set(parts) or "year" not in parts:
-        return None
-    years = numbers[parts["year"]]
-    if not are_whole(years[np.isfinite(years)], 1900, 2200):
-        return None
-    if "second" not in parts:
-        parts = {part: name for part, name in parts.items() if part not in _FRACTIONS}
-    of_date = ("month", "day") if "day_of_year" not in parts else ()
-    days = {part: numbers[parts[part]] if part in parts else 1.0 for part in of_date}
-    days = pd.DataFrame({"year": years, "month": 1.0, "day": 1.0} | days)
-    stamps = pd.to_datetime(days, errors="coerce").astype("datetime64[ns]")
-    columns = tuple(parts.values())
-    added = _added(numbers, parts)
-    hours = table.of_kind("times of day")
-    if len(hours) == 1 and parts.keys().isdisjoint(_MOST):
-        days = stamps if added is None else stamps + added
-        text = days.dt.strftime("%Y-%m-%d ") + table.frame[hours[0]].astype("str")
-        return Clock((*columns, hours[0]), text)
-    return Clock(columns, stamps, added)
-
-
-def clock_of_fractions(numbers: Mapping[str, np.ndarray], pair: tuple[str, str]) -> Clock:
-    """Returns the clock of one of the pairs that `seconds_and_fractions` finds."""
-    seconds, rest = pair
-    unit = UNIT_OF[words_of(rest)[-1]]
-    added = pd.Series(pd.to_timedelta(numbers[rest], unit=unit))
-    return Clock(pair, pd.Series(numbers[seconds]), added)
-
-
-def seconds_and_fractions(numbers: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
-    """Returns the pairs of columns of whole seconds and of the fractions of a second behind them,
+def clocks_of_fractions(numbers: Mapping[str, np.ndarray]) -> list[Clock]:
+    """Returns the clocks of columns of whole seconds and of the fractions of a second behind them,
     of names that are alike apart from their units.
     """
     stems: dict[tuple[str, ...], str] = {}
     for name in numbers:
         *stem, last = words_of(name) or [""]
         stems[(*stem, UNIT_OF.get(last, ""))] = name
-    pairs = []
+    clocks = []
     for (*stem, unit), name in stems.items():
-        seconds = stems.get((*stem, "s"))
-        if unit in _FRACTIONS and seconds is not None:
+        whole = stems.get((*stem, "s"))
+        if unit in _FRACTIONS and whole is not None:
             rest = numbers[name]
-            is_part = are_whole(rest, 0, _FRACTIONS[unit])
-            wraps = (np.diff(rest) < 0).any() or np.ptp(numbers[seconds]) == 0
-            if is_part and (numbers[seconds] % 1 == 0).all() and wraps:
-                pairs.append((seconds, name))
-    return pairs
+            seconds = numbers[whole]
+            wraps = (np.diff(rest) < 0).any() or np.ptp(seconds) == 0
+            if are_whole(rest, 0, _FRACTIONS[unit]) and (seconds % 1 == 0).all() and wraps:
+                added = pd.Series(pd.to_timedelta(rest, unit=unit))
+                clocks.append(Clock((whole, name), pd.Series(seconds), added))
+    return clocks
 
 
 def are_days(cells: pd.Series) -> bool:

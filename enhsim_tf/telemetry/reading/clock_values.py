@@ -11,21 +11,26 @@ FEWEST = 8  # rows below which no step of a column counts as regular
 _RATIOS = sorted({one / other for one in UNITS_NS.values() for other in UNITS_NS.values()})
 
 
+def steps_of(values: np.ndarray) -> np.ndarray:
+    """Returns the steps between the numbers that are not missing."""
+    return np.diff(values[np.isfinite(values)])
+
+
 def is_increasing(values: np.ndarray) -> bool:
     """Whether numbers increase nearly throughout; some may repeat, and a few may come late."""
-    steps = np.diff(values[np.isfinite(values)])
+    steps = steps_of(values)
     return bool(len(steps)) and bool(np.mean(steps >= 0) >= 0.9 and np.mean(steps > 0) >= 0.3)
 
 
 def may_count(values: np.ndarray) -> bool:
     """Whether time spans never go back, but for a few that come late, or fall in equal steps."""
-    steps = np.diff(values[np.isfinite(values)])
+    steps = steps_of(values)
     return bool(np.any(steps > 0) and np.mean(steps >= 0) >= 0.9) or is_regular(values[::-1])
 
 
 def is_regular(values: np.ndarray) -> bool:
     """Whether numbers increase nearly throughout, nearly always by one step or a multiple of it."""
-    steps = np.diff(values[np.isfinite(values)])
+    steps = steps_of(values)
     if len(steps) < FEWEST or np.mean(steps > 0) < 0.95:
         return False
     ratios = steps / np.median(steps)

@@ -2,6 +2,8 @@
 
 import re
 
+from enhsim_tf.telemetry.cleaning.options import UNITS
+
 _TIMES = set(
     "time times timestamp timestamps datetime date dates epoch elapsed simtime tout unix unixtime "
     "utc utcg posix ts clock mjd jd datenum uptime yyyymmdd hhmm hhmmss "
@@ -17,15 +19,6 @@ BESIDE = set(
     "step ref reference header stamp end stop".split()
 )
 _ENDS = set("end ende stop finish until bis to fin hasta tot".split())  # of an interval
-UNITS = {
-    "D": "d day days tage",
-    "h": "h hr hrs hour hours stunden",
-    "min": "min mins minute minutes minuten",
-    "s": "s sec secs second seconds sekunden",
-    "ms": "ms msec msecs millis millitm millisecond milliseconds",
-    "us": "us \u00b5s \u03bcs usec usecs micros microsecond microseconds",
-    "ns": "ns nsec nsecs nanos nanosecond nanoseconds",
-}
 UNIT_OF = {word: unit for unit, words in UNITS.items() for word in words.split()}
 _DAY_WORDS = ("mjd", "jd", "datenum")
 

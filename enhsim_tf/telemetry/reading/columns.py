@@ -56,9 +56,8 @@ class Layout(Table):
     clock: Clock
     times: Times | None  # of the clock; None if samples are counted
     channels: tuple[str, ...]
-    labels: tuple[str, ...]  # which mark anomalous rows
     words: tuple[str, ...]  # which may tell several series apart
-    # the other columns by the kind of finding that reports them
+    # the other columns by the kind of finding that reports them; "labels" mark anomalous rows
     left_out: Mapping[str, Sequence[str]]
 
 
@@ -112,7 +111,6 @@ def lay_out(
         clock=clock,
         times=times,
         channels=tuple(channels),
-        labels=tuple(left_out.get("labels", ())),
         words=words,
         left_out=left_out,
     )
