@@ -116,7 +116,8 @@ def _joined(channels: Sequence[Telemetry]) -> Telemetry | None:
                 if begin <= low < begin + len(part)
             ]
             values = np.stack([part.values[here, 0] for part, here in pieces], axis=1)
-            measured = np.stack([part.measured[here, 0] for part, here in pieces], axis=1)
+            marks = [part.measured[here, 0] for part, here in pieces]
+            measured = None if all(map(np.all, marks)) else np.stack(marks, axis=1)
             begin_s = low * clock.interval_s
             shared.append(Part(values.astype(np.float32), begin_s, measured=measured))
     names = tuple(channel.columns[0] for channel in channels)
