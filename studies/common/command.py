@@ -28,16 +28,17 @@ class Command:
         description: What the study does, in a sentence.
         options: Further options: for each name what `argparse` takes beside it.
         environments: The kinds of noise of the study, of which `--environment` chooses one; the
-            options that `run` takes hold those that are asked for as `environments`.
-        run: Runs the study; it takes the options, the settings and the output folder. None: `run`
-            of `studies.STUDY.run`.
+            options hold those that are asked for as `environments`.
+        tables_of: Computes the tables of one kind of noise and one seed; it takes the options, the
+            settings, which hold both, and stages. None: `run` of `studies.STUDY.run` runs the
+            study; it takes the options, the settings and the output folder.
     """
 
     study: str
     description: str
     options: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     environments: Iterable[str] = ()
-    run: Callable[[argparse.Namespace, Any, Path], Any] | None = None
+    tables_of: "Callable[[argparse.Namespace, Any, Any], Mapping[str, pd.DataFrame]] | None" = None
 
     def __call__(self, arguments: list[str] | None = None) -> int:
         """Runs the command. An error of the user is reported as one line, with exit code 2."""
@@ -97,10 +98,20 @@ class Command:
         remove_leftovers(out)
         options.cache = make_folder(options.cache or default_cache())
         turned = {} if options.seeds is None else {f"{self.study}__num_seeds": options.seeds}
-        run = self.run or importlib.import_module(f"studies.{self.study}.run").run
-        run(options, make_settings(options.budget, **turned), out)
+        self.run(options, make_settings(options.budget, **turned), out)
         tell(f"tables, findings.json and figures in {out}/")
         return 0
+
+    def run(self, options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]:
+        """Runs the study, writes to an existing folder and returns the findings."""
+        if self.tables_of is None:
+            return importlib.import_module(f"studies.{self.study}.run").run(options, settings, out)
+        from studies.common.replicates import run_study
+
+        def tables_of(environment: str, seed: int, stages: Any) -> "Mapping[str, pd.DataFrame]":
+            return self.tables_of(options, settings.of(environment, seed), stages)
+
+        return run_study(self.study, tables_of, options.environments, options, settings, out)
 
 
 def add_budget_and_cache(parser: argparse.ArgumentParser) -> None:

@@ -109,6 +109,13 @@ class World:
                 )
         return {"nominal": nominal, "reference": reference, "anomalous": np.concatenate(parts)}
 
+    def tables(self, stages: Stages) -> "dict[str, pd.DataFrame]":
+        """The table `rows`, with every number of real windows."""
+        import pandas as pd
+
+        parts = [self.rows(number, stages) for number in self.settings.few_windows.num_real]
+        return {"rows": pd.concat(parts, ignore_index=True)}
+
     def rows(self, num_real: int, stages: Stages) -> "pd.DataFrame":
         """The rows of all training data at a number of real windows, which are a stage of their
         own.

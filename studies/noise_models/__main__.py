@@ -1,27 +1,22 @@
 """`python -m studies.noise_models`: every noise model on every family of noise."""
 
-import argparse
 import sys
-from pathlib import Path
+from argparse import Namespace
 from typing import Any
 
 from studies.common.command import Command
 from studies.common.noise_processes import GALLERY
 
 
-def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]:
-    """Runs the study and returns its findings."""
-    from studies.common.replicates import run_study
+def tables_of(options: Namespace, settings: Any, stages: Any) -> dict[str, Any]:
+    """The tables of one family of noise and seed."""
     from studies.noise_models.cells import Cell
 
-    def tables_of(family: str, seed: int, stages: Any) -> dict[str, Any]:
-        return Cell(settings.of(family, seed), stages).tables()
-
-    return run_study("noise_models", tables_of, options.environments, options, settings, out)
+    return Cell(settings, stages).tables()
 
 
 description = "Tries noise models on fourteen families of noise."
-command = Command("noise_models", description, environments=GALLERY, run=run)
+command = Command("noise_models", description, environments=GALLERY, tables_of=tables_of)
 
 if __name__ == "__main__":
     sys.exit(command())

@@ -2,34 +2,28 @@
 environments.
 """
 
-import argparse
 import sys
-from pathlib import Path
+from argparse import Namespace
 from typing import Any
 
 from studies.common.command import Command
 from studies.common.noise_processes import NOISES
 
 
-def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]:
-    """Runs the study and returns its findings; degraded modes are tested with the first kind of
+def tables_of(options: Namespace, settings: Any, stages: Any) -> dict[str, Any]:
+    """The tables of one kind of noise and seed; degraded modes are tested with the first kind of
     noise.
     """
-    from studies.common.replicates import run_study
     from studies.robustness.degraded_modes import DegradedModes
     from studies.robustness.replicate import Replicate
 
-    def tables_of(environment: str, seed: int, stages: Any) -> dict[str, Any]:
-        one = Replicate(settings.of(environment, seed), stages)
-        return one.tables | (
-            {"degraded": DegradedModes(one).table} if environment == options.environments[0] else {}
-        )
-
-    return run_study("robustness", tables_of, options.environments, options, settings, out)
+    one = Replicate(settings, stages)
+    is_first = settings.noise == options.environments[0]
+    return one.tables | ({"degraded": DegradedModes(one).table} if is_first else {})
 
 
 description = "Trains detectors with each kind of noise and counts false alarms and finds."
-command = Command("robustness", description, environments=NOISES, run=run)
+command = Command("robustness", description, environments=NOISES, tables_of=tables_of)
 
 if __name__ == "__main__":
     sys.exit(command())

@@ -51,7 +51,7 @@ def test_every_table_has_every_row_and_a_second_run_trains_nothing(
         monkeypatch.setattr(
             module, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")}
         )
-    run = importlib.import_module(f"studies.{study}.__main__").run
+    run = importlib.import_module(f"studies.{study}.__main__").command.run
     kept = importlib.import_module(f"studies.{study}.summary").KEPT
     options = argparse.Namespace(cache=tmp_path / "cache", environments=("shot",), fresh=False)
     settings = make_settings("smoke", **SMALL)

@@ -10,7 +10,7 @@ import pytest
 
 from enhsim_tf.common.stages import Stages
 from studies.common.settings import make_settings
-from studies.factorial.__main__ import run
+from studies.factorial.__main__ import command
 from studies.factorial.cells import CELLS, DETECTORS, REFERENCES, Cell
 from studies.factorial.pipelines import THRESHOLD, TRAINING, Pipelines
 from studies.factorial.summary import KEPT
@@ -68,7 +68,7 @@ def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_p
 
     monkeypatch.setattr(Pipelines, "judged", judged)
     options = argparse.Namespace(cache=tmp_path / "cache", environments=("shot",), fresh=False)
-    found = run(options, make_settings("smoke", **SMALL), tmp_path)
+    found = command.run(options, make_settings("smoke", **SMALL), tmp_path)
     table = KEPT.read(tmp_path)["cells"]
     assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 26 * len(DETECTORS)
     assert not table.duplicated(["environment", "cell", "detector"]).any()
