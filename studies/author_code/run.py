@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.measures import autocorrelation
 from enhsim_tf.common.stages import Stages, save_arrays
 from enhsim_tf.paper import noise
 from enhsim_tf.paper.claims import CLAIMS
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.settings import Settings, make_settings
+from studies.common.measurements import add_runs, measured
 
 EXTRACTED = "extracted"
 WHITE = "white"
@@ -52,6 +52,11 @@ class Run(NamedTuple):
     span: str
     iterations: int
     seed: int
+
+    @property
+    def words(self) -> str:
+        """The run without its seed, in words."""
+        return f"{self.noise} noise, span {self.span}, {self.iterations:,} iterations"
 
 
 KEYS = list(Run._fields)
@@ -145,36 +150,14 @@ class AuthorPipeline(Pipeline):
         )
 
 
-def measure(run: Run, code: Path, budget: str, cache: Path, tell: Callable) -> pd.DataFrame:
-    """The measurements of one run: one row for each, with the columns `KEYS`, `claim`, `name` and
-    `value`.
-    """
-    pipeline = AuthorPipeline(settings_of(run, budget), Stages(cache, tell=tell), code)
-    rows = [
-        (*run, claim.id, name, value)
-        for claim in CLAIMS
-        if claim.id in MEASURED
-        for name, value in claim.measure(pipeline).items()
-    ]
-    return pd.DataFrame(rows, columns=[*KEYS, "claim", "name", "value"])
-
-
 def collect(
     planned: list[Run], code: Path, budget: str, cache: Path, folder: Path, tell: Callable
 ) -> pd.DataFrame:
     """Does the runs that the table in the folder does not have yet, and returns the table."""
-    path = folder / TABLE
-    tables = [pd.read_parquet(path)] if path.is_file() else []
-    done = {Run(*row) for table in tables for row in table[KEYS].itertuples(index=False)}
-    for number, run in enumerate(planned, 1):
-        words = f"{run.noise} noise, span {run.span}, {run.iterations:,} iterations"
-        state = " (in the table)" if run in done else ""
-        tell(f"run {number} of {len(planned)}: {words}, seed {run.seed}{state}")
-        if run in done:
-            continue
-        tables.append(measure(run, code, budget, cache, tell))
-        with replace_file(path) as temporary:
-            pd.concat(tables, ignore_index=True).to_parquet(
-                temporary, compression="zstd", index=False
-            )
-    return pd.concat(tables, ignore_index=True)
+
+    def measure(run: Run) -> pd.DataFrame:
+        claims = [claim for claim in CLAIMS if claim.id in MEASURED]
+        stages = Stages(cache, tell=tell)
+        return measured(run, claims, AuthorPipeline(settings_of(run, budget), stages, code))
+
+    return add_runs(planned, measure, folder / TABLE, tell)

@@ -12,7 +12,8 @@ from enhsim_tf.common.stages import Stages
 from enhsim_tf.paper.claims import CLAIMS
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.settings import make_settings
-from studies.readings.run import COLUMNS, KEYS, READINGS, Run
+from studies.common.measurements import measured
+from studies.readings.run import COLUMNS, READINGS, Run
 
 
 def measure(run: Run, budget: str, cache: Path) -> pd.DataFrame:
@@ -29,12 +30,7 @@ def measure(run: Run, budget: str, cache: Path) -> pd.DataFrame:
         make_settings(budget, seed=run.seed, **rounds, **READINGS[run.reading]),
         Stages(cache, tell=tell),
     )
-    rows = [
-        (*run, claim.id, name, value)
-        for claim in CLAIMS
-        for name, value in claim.measure(pipeline).items()
-    ]
-    return pd.DataFrame(rows, columns=[*KEYS, "claim", "name", "value"])
+    return measured(run, CLAIMS, pipeline)
 
 
 if __name__ == "__main__":

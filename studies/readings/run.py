@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from enhsim_tf.common.atomic_files import replace_file
+from studies.common.measurements import add_runs
 
 BASE = "base"
 AUTHOR = "author's configuration"
@@ -76,7 +76,6 @@ ROUNDINGS = {"oneDNN": "1", "Eigen": "0", ANOTHER: "1"}
 also depends on the processor.
 """
 TABLE = "measurements.parquet"
-KEYS = ["reading", "rounding", "seed"]
 
 
 class Run(NamedTuple):
@@ -91,6 +90,14 @@ class Run(NamedTuple):
     reading: str
     rounding: str
     seed: int
+
+    @property
+    def words(self) -> str:
+        """The run without its seed, in words."""
+        return f"{self.reading}, {self.rounding}"
+
+
+KEYS = list(Run._fields)
 
 
 def runs(num_columns: int, num_others: int, on_another: bool = False) -> list[Run]:
@@ -134,30 +141,14 @@ def collect(
     Returns:
         The table: one row for each measurement of each claim in each run.
     """
-    path = folder / TABLE
-    table = (
-        pd.read_parquet(path)
-        if path.is_file()
-        else pd.DataFrame(columns=[*KEYS, "claim", "name", "value"])
-    )
-    done = {Run(*row) for row in table[KEYS].drop_duplicates().itertuples(index=False)}
-    for number, run in enumerate(planned, 1):
-        tell(
-            f"run {number} of {len(planned)}: {run.reading}, {run.rounding}, seed "
-            f"{run.seed}{' (in the table)' if run in done else ''}"
-        )
-        if run in done:
-            continue
-        measured = folder / "run.parquet"
-        arguments = ["-m", "studies.readings.one", *run, budget, cache / run.rounding, measured]
+    path = folder / "run.parquet"
+
+    def measure(run: Run) -> pd.DataFrame:
+        arguments = ["-m", "studies.readings.one", *run, budget, cache / run.rounding, path]
         environment = os.environ | {"TF_ENABLE_ONEDNN_OPTS": ROUNDINGS[run.rounding]}
         subprocess.run([sys.executable, *map(str, arguments)], env=environment, check=True)
-        table = (
-            pd.concat([table, pd.read_parquet(measured)], ignore_index=True)
-            if len(table)
-            else pd.read_parquet(measured)
-        )
-        with replace_file(path) as temporary:
-            table.to_parquet(temporary, compression="zstd", index=False)
-        measured.unlink()
-    return table
+        table = pd.read_parquet(path)
+        path.unlink()
+        return table
+
+    return add_runs(planned, measure, folder / TABLE, tell)
