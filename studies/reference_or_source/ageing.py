@@ -1,6 +1,5 @@
 """Real cells as a system of the study: ageing is the fault, and sisters set the thresholds."""
 
-import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -61,7 +60,7 @@ def ageing_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
     """
     for group, sisters in _groups(cells):
         curve = open_circuit_curve(cells, group)
-        scores: dict[tuple[str, ...], dict[str, Scores]] = {}
+        scores: dict[tuple[tuple[str, str], ...], dict[str, Scores]] = {}
         for cell in sisters:
             known = cell.of_use(KNOWN)
             for name, simulator in SIMULATORS.items():
@@ -70,14 +69,13 @@ def ageing_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
                     windows = windows_of(cell, simulator, values, curve)
                     with_others = (name, suffix) == (next(iter(SIMULATORS)), "")
                     for about, each in scores_of(windows, name + suffix, 0, with_others):
-                        scores.setdefault(tuple(about.values()), {})[cell.name] = each
-        for key, by_cell in scores.items():
-            about = dict(zip(("simulator", "use", "detector"), key, strict=True))
+                        scores.setdefault(tuple(about.items()), {})[cell.name] = each
+        for about, by_cell in scores.items():
             for cell in sisters:
                 others = [each.known for name, each in by_cell.items() if name != cell.name]
                 own = by_cell[cell.name]
                 for row in _rows_of(cell, own.known, own.tested, others):
-                    yield about | row
+                    yield dict(about) | row
 
 
 def family_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
@@ -103,12 +101,13 @@ def family_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
             level = f"{'sisters' if with_sisters else 'alone'} and {number}"
             for cell in sisters:
                 others = [sister.name for sister in sisters if sister is not cell]
+                learnt = others if with_sisters else []
                 # a sister is judged by models without the cell
                 of_sisters = [
                     _few(
                         parts,
                         sister,
-                        [each for each in others if each != sister and with_sisters],
+                        [other for other in learnt if other != sister],
                         number,
                         _later(parts[sister]),
                     )
@@ -116,12 +115,12 @@ def family_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
                 ]
                 later = _later(parts[cell.name])
                 tested = join([later, parts[cell.name].tested])
-                own = _few(parts, cell.name, others if with_sisters else [], number, tested)
+                own = _few(parts, cell.name, learnt, number, tested)
                 for use, scores in own.items():
                     known, judged = np.split(scores, [len(later.starts)])
                     pooled = [each[use] for each in of_sisters]
-                    about = {"level": level, "use": use, "detector": MAIN}
-                    about |= {"simulator": name if use == REFERENCE else NONE}
+                    simulated = name if use == REFERENCE else NONE
+                    about = {"level": level, "use": use, "detector": MAIN, "simulator": simulated}
                     for row in _rows_of(cell, known, judged, pooled):
                         yield about | row
 
@@ -129,43 +128,27 @@ def family_rows(cells: Sequence[AgeingCell]) -> Iterator[dict[str, Any]]:
 def windows_of(cell: AgeingCell, simulator: Any, values: Sequence[float], curve: Any) -> Judged:
     """Cuts the windows of a cell; faults are the discharges that are tested, with their losses."""
 
-    def windows(discharges: Sequence[Discharge]) -> Windows:
-        return join(
-            [
-                _windows_of_one(cell, discharge, place, simulator, values, curve)
-                for place, discharge in enumerate(discharges)
-            ]
+    def of_one(place: int, discharge: Discharge) -> Windows:
+        current = discharge.values[:, _CHANNELS]
+        run = simulator(current, cell.ambient_c, values, curve)
+        coarse = np.concatenate([run, current[:, None]], axis=1)
+        inputs = inputs_of(current[:, None] / CAPACITY_AH, len(current), WINDOW)
+        starts = _starts(discharge)
+        series = discharge.values[:, :_CHANNELS], coarse, inputs
+        return Windows(
+            *(cut([each], starts, WINDOW) for each in series),
+            starts + place * _APART,
+            np.full(len(starts), place),
         )
 
-    known = windows(cell.of_use(KNOWN))
-    tested = windows(_tested(cell))
-    scale = known.telemetry.std(axis=(0, 1))
     known, tested = (
-        dataclasses.replace(part, telemetry=part.telemetry / scale) for part in (known, tested)
+        join([of_one(place, discharge) for place, discharge in enumerate(discharges)])
+        for discharges in (cell.of_use(KNOWN), _tested(cell))
     )
+    scale = known.telemetry.std(axis=(0, 1))
+    known, tested = (part._replace(telemetry=part.telemetry / scale) for part in (known, tested))
     faults = tuple((discharge.use, cell.loss(discharge)) for discharge in _tested(cell))
-    return Judged(known, tested, _labels(_tested(cell)), faults, known.coarse, scale)
-
-
-def _windows_of_one(
-    cell: AgeingCell,
-    discharge: Discharge,
-    place: int,
-    simulator: Any,
-    values: Sequence[float],
-    curve: Any,
-) -> Windows:
-    current = discharge.values[:, _CHANNELS]
-    run = simulator(current, cell.ambient_c, values, curve)
-    coarse = np.concatenate([run, current[:, None]], axis=1)
-    inputs = inputs_of(current[:, None] / CAPACITY_AH, len(current), WINDOW)
-    starts = _starts(discharge)
-    series = discharge.values[:, :_CHANNELS], coarse, inputs
-    return Windows(
-        *(cut([each], starts, WINDOW) for each in series),
-        starts + place * _APART,
-        np.full(len(starts), place),
-    )
+    return Judged(known, tested, tested.units, faults, known.coarse, scale)
 
 
 def _few(
@@ -180,8 +163,7 @@ def _few(
     for place, sister in enumerate(sisters, 1):
         windows = parts[sister].known
         learnt.append(
-            dataclasses.replace(
-                windows,
+            windows._replace(
                 telemetry=windows.telemetry * parts[sister].scale / own.scale,  # of the new cell
                 starts=windows.starts + place * NUM_KNOWN * _APART,
                 units=windows.units + place * NUM_KNOWN,
@@ -189,7 +171,7 @@ def _few(
         )
     known = join(learnt)
     if len(np.unique(known.units)) < 3:  # the windows of one discharge are in all folds
-        known = dataclasses.replace(known, units=np.arange(len(known.starts)))
+        known = known._replace(units=np.arange(len(known.starts)))
     labels = np.zeros(len(tested.starts), int)
     comparison = Comparison(Judged(known, tested, labels, (), known.coarse, own.scale), 0)
     uses = (REFERENCE, NO_SIMULATOR)
@@ -214,19 +196,16 @@ def _starts(discharge: Discharge) -> np.ndarray:
     return np.arange(0, len(discharge.values) - WINDOW + 1, STRIDE)
 
 
-def _labels(discharges: Sequence[Discharge]) -> np.ndarray:
-    return np.repeat(np.arange(len(discharges)), [len(_starts(each)) for each in discharges])
-
-
 def _rows_of(
     cell: AgeingCell, known: np.ndarray, tested: np.ndarray, others: Sequence[np.ndarray]
 ) -> Iterator[dict[str, Any]]:
     """The rows of one cell, from the scores of its known and tested windows, and from those of its
     sisters, which set the threshold.
     """
-    labels = _labels(_tested(cell))
+    discharges = _tested(cell)
+    ends = np.cumsum([len(_starts(discharge)) for discharge in discharges])
     parts = [(KNOWN, 0.0, known)]
-    for number, discharge in enumerate(_tested(cell)):
-        parts.append((discharge.use, cell.loss(discharge), tested[labels == number]))
+    for discharge, scores in zip(discharges, np.split(tested, ends[:-1]), strict=True):
+        parts.append((discharge.use, cell.loss(discharge), scores))
     for row in flagged(parts, np.concatenate(others), known, RATE):
         yield {"group": cell.group, "cell": cell.name} | row

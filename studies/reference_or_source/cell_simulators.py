@@ -67,25 +67,24 @@ def temperature(heat_w: np.ndarray, ambient_c: float, transfer: float) -> np.nda
     return ambient_c + _lagged(heat_w / transfer, decay)
 
 
-def counted_charge(
-    current: np.ndarray, ambient_c: float, values: Sequence[float], curve: Curve
+def circuit(
+    current: np.ndarray,
+    ambient_c: float,
+    values: Sequence[float],
+    curve: Curve,
+    slow_share: float = SLOW_SHARE,
 ) -> np.ndarray:
-    """Open-circuit voltage at the counted charge less the drop over a resistance; see
-    `SIMULATORS`.
+    """Open-circuit voltage at the counted charge less the drop over a resistance, of which a
+    capacitor bridges a share; see `SIMULATORS`.
     """
     capacity, resistance, transfer = _physical(values)
-    volts = curve(_taken(current, capacity)) - resistance * current
+    slow = resistance * slow_share * _lagged(current, np.exp(-INTERVAL_S / SLOW_S))
+    volts = curve(_taken(current, capacity)) - resistance * (1 - slow_share) * current - slow
     return np.stack([volts, temperature(resistance * current**2, ambient_c, transfer)], axis=1)
 
 
-def circuit(
-    current: np.ndarray, ambient_c: float, values: Sequence[float], curve: Curve
-) -> np.ndarray:
-    """Counted charge with a part of the resistance bridged by a capacitor; see `SIMULATORS`."""
-    capacity, resistance, transfer = _physical(values)
-    slow = resistance * SLOW_SHARE * _lagged(current, np.exp(-INTERVAL_S / SLOW_S))
-    volts = curve(_taken(current, capacity)) - resistance * (1 - SLOW_SHARE) * current - slow
-    return np.stack([volts, temperature(resistance * current**2, ambient_c, transfer)], axis=1)
+counted_charge = functools.partial(circuit, slow_share=0.0)
+"""The circuit without a capacitor."""
 
 
 def single_particle(

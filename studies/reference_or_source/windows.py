@@ -1,8 +1,7 @@
 """Windows of recorded runs: what an engineer knows, and what everything is judged on."""
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,8 +12,7 @@ from studies.reference_or_source.recordings import commands_of, key_of
 NUM_FOLDS = 3
 
 
-@dataclasses.dataclass(frozen=True)
-class Windows:
+class Windows(NamedTuple):
     """Windows of telemetry, and of the coarse run and the commands over the same time.
 
     Args:
@@ -41,23 +39,15 @@ class Windows:
 
     def take(self, chosen: np.ndarray) -> "Windows":
         """The windows of a mask or of indices."""
-        return Windows(
-            *(getattr(self, field.name)[chosen] for field in dataclasses.fields(Windows))
-        )
+        return Windows(*(values[chosen] for values in self))
 
 
 def join(parts: Sequence[Windows]) -> Windows:
     """The windows of several parts, one after another."""
-    return Windows(
-        *(
-            np.concatenate([getattr(part, field.name) for part in parts])
-            for field in dataclasses.fields(Windows)
-        )
-    )
+    return Windows(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-@dataclasses.dataclass(frozen=True)
-class Judged:
+class Judged(NamedTuple):
     """What is known of a system, and what detectors are judged on.
 
     Args:
