@@ -103,8 +103,10 @@ def _quadratic(inputs: np.ndarray, telemetry: np.ndarray, first: slice, penalty:
     from sklearn.preprocessing import PolynomialFeatures, StandardScaler
     from threadpoolctl import threadpool_limits
 
+    def rows(windows: np.ndarray) -> np.ndarray:
+        return np.concatenate(windows[:, :, first]).astype(np.float64)
+
     channels = telemetry.shape[2]
-    number = inputs[:, :, first].shape[2]
     machine = make_pipeline(
         StandardScaler(),
         PolynomialFeatures(2, include_bias=False),
@@ -112,10 +114,5 @@ def _quadratic(inputs: np.ndarray, telemetry: np.ndarray, first: slice, penalty:
         Ridge(penalty, solver="cholesky"),
     )
     with threadpool_limits(1):
-        machine.fit(
-            inputs[:, :, first].reshape(-1, number).astype(np.float64),
-            telemetry.reshape(-1, channels),
-        )
-    return lambda windows: machine.predict(
-        windows[:, :, first].reshape(-1, number).astype(np.float64)
-    ).reshape(*windows.shape[:2], channels)
+        machine.fit(rows(inputs), telemetry.reshape(-1, channels))
+    return lambda windows: machine.predict(rows(windows)).reshape(*windows.shape[:2], channels)

@@ -42,6 +42,8 @@ KEPT = KeptTables(
     command="python -m studies.reference_or_source",
     former=("alarms",),
 )
+REAL = ("cells", "families")
+"""The systems of real cells."""
 PHYSICS = "single particle"
 """The simulator of the cells that the contrasts are about."""
 FITTED_AND_ENHANCED = "fitted and enhanced"
@@ -112,10 +114,9 @@ def _of_detector(table: "pd.DataFrame") -> dict[str, Any]:
     """What one detector finds in each system and use, and the contrasts."""
     found: dict[str, Any] = {"uses": {}, "contrasts": {}}
     for system, rows in table.groupby("system", sort=False):
-        factors = _factors(system)
-        values = {
-            label: _by_unit(each, factors) for label, each in rows.groupby("label", sort=False)
-        }
+        factors = ["group", "cell"] if system in REAL else ["seed", "kind"]
+        by_label = dict(iter(rows.groupby("label", sort=False)))
+        values = {label: _by_unit(each, factors) for label, each in by_label.items()}
         found["uses"][system] = {
             label: {
                 "found": _interval(values[label]["found"], factors),
@@ -129,7 +130,7 @@ def _of_detector(table: "pd.DataFrame") -> dict[str, Any]:
                     for cell, odd in each[each["kind"] == ODD].groupby("cell", sort=False)
                 },
             }
-            for label, each in rows.groupby("label", sort=False)
+            for label, each in by_label.items()
         }
         pairs = CONTRASTS + SHOWN_TOO
         if system == "families":
@@ -141,10 +142,6 @@ def _of_detector(table: "pd.DataFrame") -> dict[str, Any]:
     return found
 
 
-def _factors(system: str) -> list[str]:
-    return ["group", "cell"] if system in ("cells", "families") else ["seed", "kind"]
-
-
 def _labels(table: "pd.DataFrame") -> list[str]:
     """What the use of each row is called."""
     labels = []
@@ -152,7 +149,7 @@ def _labels(table: "pd.DataFrame") -> list[str]:
         table["system"], table["simulator"], table["use"], table["level"], strict=True
     ):
         name = simulator
-        if system in ("cells", "families"):
+        if system in REAL:
             name = FITTED if simulator.endswith(CELL_FITTED) else CRUDE
         label = LABELS.get((name, use), use if use not in OF_SIMULATOR else f"{use}, fitted")
         physics = simulator.removesuffix(CELL_FITTED)
@@ -166,14 +163,16 @@ def _nominal(rows: "pd.DataFrame") -> "pd.DataFrame":
     return rows[rows["kind"].isin([NOMINAL, KNOWN])]
 
 
-def _to_be_found(rows: "pd.DataFrame") -> "pd.DataFrame":
-    aged = (rows["kind"] == JUDGED) & (rows["severity"] >= LEAST_LOSS)
-    return rows[aged | ~rows["kind"].isin([NOMINAL, KNOWN, JUDGED, ODD])]
+def _judged(rows: "pd.DataFrame") -> "pd.DataFrame":
+    """The rows of faults, and of later discharges."""
+    return rows[~rows["kind"].isin([NOMINAL, KNOWN, ODD])]
 
 
 def _by_unit(rows: "pd.DataFrame", factors: list[str]) -> "pd.DataFrame":
-    """The shares of each cell, or of each seed and kind of fault."""
-    return _to_be_found(rows).groupby(factors, sort=False)[["found", "found_alike"]].mean()
+    """The shares of what is to be found, of each cell, or of each seed and kind of fault."""
+    judged = _judged(rows)
+    chosen = judged[(judged["kind"] != JUDGED) | (judged["severity"] >= LEAST_LOSS)]
+    return chosen.groupby(factors, sort=False)[["found", "found_alike"]].mean()
 
 
 def _interval(values: "pd.Series", factors: list[str]) -> dict[str, float]:
@@ -234,14 +233,10 @@ def _half(rows: "pd.DataFrame", factors: list[str]) -> dict[str, float | None]:
     """The severity or loss at which half of the windows are found, of each cell or kind of fault;
     None where it is never reached.
     """
-    judged = rows[~rows["kind"].isin([NOMINAL, KNOWN, ODD])]
-    by = factors[1]
-    halves = {}
-    for name, each in judged.groupby(by, sort=False):
-        halves[str(name)] = severity_at_half(
-            each["severity"].to_numpy(), each["found_alike"].to_numpy()
-        )
-    return halves
+    return {
+        str(name): severity_at_half(each["severity"].to_numpy(), each["found_alike"].to_numpy())
+        for name, each in _judged(rows).groupby(factors[1], sort=False)
+    }
 
 
 def severity_at_half(severities: np.ndarray, shares: np.ndarray) -> float | None:
@@ -261,7 +256,7 @@ def _course(rows: "pd.DataFrame", factors: list[str]) -> dict[str, list[float]]:
     """Share of windows found over severity, at equal false alarms, and the number of cells or kinds
     in each; cells in steps of 2.5 % of their capacity.
     """
-    judged = rows[~rows["kind"].isin([NOMINAL, KNOWN, ODD])]
+    judged = _judged(rows)
     severity = judged["severity"]
     if factors[0] == "group":
         severity = np.round(severity / 0.025) * 0.025
@@ -278,12 +273,10 @@ def _map(table: "pd.DataFrame") -> dict[str, Any]:
     """The earlier map of battery and aircraft over known telemetry, with wrong physics."""
     main = table[(table["axis"] == "main") & (table["simulator"] == CRUDE)]
     systems: dict[str, Any] = {}
-    for system, rows in main.groupby("system", sort=False):
-        points = []
-        for units, each in rows.groupby("units", sort=False):
-            uses = {use: _use_of_map(some) for use, some in each.groupby("use", sort=False)}
-            points.append({"axis": "main", "simulator": CRUDE, "units": int(units), "uses": uses})
-        systems[system] = {"points": points}
+    for (system, units), rows in main.groupby(["system", "units"], sort=False):
+        uses = {use: _use_of_map(each) for use, each in rows.groupby("use", sort=False)}
+        point = {"axis": "main", "simulator": CRUDE, "units": int(units), "uses": uses}
+        systems.setdefault(system, {"points": []})["points"].append(point)
     return systems
 
 

@@ -11,10 +11,9 @@ thresholds set alike.
 | autoregression with inputs | errors of a prediction by last samples and commands | its errors |
 """
 
-import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,8 +33,7 @@ WITHOUT = (NO_SIMULATOR, COMMANDS, ONE_STEP)
 """Uses with a simulator, and those that need none."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Scores:
+class Scores(NamedTuple):
     """Scores of one detector in one use.
 
     Args:
