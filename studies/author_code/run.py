@@ -62,7 +62,7 @@ class Run(NamedTuple):
 KEYS = list(Run._fields)
 
 
-def runs(seeds: int = 10, seeds_of_demo: int = 5, seeds_of_long: int = 3) -> list[Run]:
+def runs(seeds: int, seeds_of_demo: int, seeds_of_long: int) -> list[Run]:
     """The runs in their order: both kinds of noise with one seed before the next seed, then the
     span and then the iterations of his demo.
 

@@ -1,7 +1,5 @@
 """The author's code beside the networks of this project in his configuration."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pandas as pd
 from scipy.stats import mannwhitneyu
@@ -71,21 +69,16 @@ def beside(his: pd.DataFrame, ours: pd.DataFrame) -> tuple[list[str], list[list[
         Header and rows.
     """
     rows = []
-    values = pairs(his, ours)
+    groups = pairs(his, ours).groupby(["kind", "claim", "name", "whose"], sort=False)["value"]
+    values = {key: group.to_numpy() for key, group in groups}
     for kind in READING_OF:
-        for (claim, name), words in MEASURED.items():
-            chosen = values["kind"].map(lambda found, kind=kind: found == kind)
-            chosen &= (values["claim"] == claim) & (values["name"] == name)
-            of = {
-                whose: values.loc[chosen & (values["whose"] == whose), "value"].to_numpy()
-                for whose in ("his", "ours")
-            }
-            if not len(of["his"]):
+        for measured, words in MEASURED.items():
+            both = [values.get((kind, *measured, whose), ()) for whose in ("his", "ours")]
+            if not len(both[0]):
                 continue
-            is_tested = min(map(len, of.values())) >= 3
-            test: Callable = mannwhitneyu
-            p = f"{test(of['his'], of['ours'], method='exact').pvalue:.2g}" if is_tested else ""
-            rows.append([words_of(kind), words, *map(_range, of.values()), p])
+            is_tested = min(map(len, both)) >= 3
+            p = f"{mannwhitneyu(*both, method='exact').pvalue:.2g}" if is_tested else ""
+            rows.append([words_of(kind), words, *map(_range, both), p])
     return ["run", "measurement", "his code (seeds)", "ours (seeds)", "p"], rows
 
 

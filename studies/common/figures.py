@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from enhsim_tf.common.plot_style import DOUBLE
 
 
-def leave_room(grid: np.ndarray, left: float, width: float) -> None:
+def leave_room(grid: np.ndarray, left: float, width: float, gap: float = 0.03) -> None:
     """Moves the panels of a figure of width `DOUBLE` to the right, so that the labels of its rows
     fit beside them.
 
@@ -17,11 +17,12 @@ def leave_room(grid: np.ndarray, left: float, width: float) -> None:
         grid: Axes of shape `(rows, columns)`.
         left: Distance from the left edge of the figure to the panels, in inches.
         width: Width of all panels and their gaps, as a share of that of the figure.
+        gap: Distance between two panels, as a share of the width of the figure.
     """
     each = width / grid.shape[1]
     for (_, column), axes in np.ndenumerate(grid):
         place = axes.get_position()
-        axes.set_position([left / DOUBLE + column * each, place.y0, each - 0.03, place.height])
+        axes.set_position([left / DOUBLE + column * each, place.y0, each - gap, place.height])
 
 
 def legend(

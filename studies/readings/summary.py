@@ -34,6 +34,7 @@ from studies.readings.run import (
     AUTHOR,
     BASE,
     DECIDING,
+    FACTORIAL,
     FACTORS,
     FORMER,
     KEYS,
@@ -255,8 +256,6 @@ def effects(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     Returns:
         Header and rows; no rows without a complete block.
     """
-    from studies.readings.run import FACTORIAL
-
     signs_of = pd.DataFrame(
         {name: {reading: 1 if name in reading else -1 for reading in FACTORIAL} for name in FACTORS}
     )
@@ -336,11 +335,11 @@ def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         row = [reading, str(len(runs[["rounding", "seed"]].drop_duplicates()))]
         for claim in claims:
             given = counts(runs, reading, claim) if touches(reading, claim) else None
-            row.append(
-                f"{given.most_common(1)[0][0]} {given.most_common(1)[0][1]}/{given.total()}"
-                if given
-                else ""
-            )
+            if given:
+                ((verdict, number),) = given.most_common(1)
+                row.append(f"{verdict} {number}/{given.total()}")
+            else:
+                row.append("")
         rows.append(row)
     return ["reading", "runs", *claims], rows
 
