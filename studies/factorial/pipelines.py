@@ -19,6 +19,7 @@ from enhsim_tf.paper.telemetry import cut_windows
 from enhsim_tf.telemetry.windows import random_window_starts
 from studies.common import detectors, evaluation
 from studies.common.gaussian_noise import GaussianAutoregression
+from studies.common.paper_gan import PaperGAN
 from studies.common.tables import stage_tables
 from studies.factorial.cells import (
     AUTOREGRESSION,
@@ -26,7 +27,6 @@ from studies.factorial.cells import (
     FEW,
     MANY,
     MOVING_AVERAGE,
-    PAPER_GAN,
     REFERENCES,
     RIDGE,
     WHOLE_WINDOWS,
@@ -38,9 +38,8 @@ from studies.robustness.replicate import Replicate
 if TYPE_CHECKING:
     import pandas as pd
 
-    from studies.common.paper_gan import PaperGAN
-
 Enhance = Callable[[np.ndarray], np.ndarray]
+NoiseModel = WindowBootstrap | GaussianAutoregression | PaperGAN
 TRAINING = "arms, training"
 THRESHOLD = "arms, threshold"
 """Purposes of windows: to train a detector, and to set its threshold."""
@@ -210,26 +209,15 @@ class Pipelines:
         coarse, target = self.pairs(starts)
         return target - self.enhancer(enhancer, windows)(coarse)
 
-    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | PaperGAN":
+    def generator(self, cell: Cell) -> NoiseModel:
         """The fitted noise model of a cell."""
         return self._fitted(cell.source, cell.generator)
 
-    def _fit(
-        self, source: tuple[str, str, str], generator: str
-    ) -> "WindowBootstrap | GaussianAutoregression | PaperGAN":
-        fit = {
-            WHOLE_WINDOWS: WindowBootstrap,
-            AUTOREGRESSION: self._autoregression,
-            PAPER_GAN: self._paper_gan,
-        }[generator]
-        return fit(self.extracted(*source))
-
-    def _autoregression(self, noise: np.ndarray) -> GaussianAutoregression:
-        return GaussianAutoregression.fit(
-            noise, min(self.settings.factorial.max_order, self.window - 1)
-        )
-
-    def _paper_gan(self, noise: np.ndarray) -> "PaperGAN":
-        from studies.common.paper_gan import PaperGAN
-
+    def _fit(self, source: tuple[str, str, str], generator: str) -> NoiseModel:
+        noise = self.extracted(*source)
+        if generator == WHOLE_WINDOWS:
+            return WindowBootstrap(noise)
+        if generator == AUTOREGRESSION:
+            order = min(self.settings.factorial.max_order, self.window - 1)
+            return GaussianAutoregression.fit(noise, order)
         return PaperGAN(noise, self.settings.paper)

@@ -115,14 +115,9 @@ def corner(switched: Iterable[str], generator: str) -> str:
         switched: Names of factors.
         generator: The second level of the factor `generator`.
     """
-    switched = set(switched)
+    first = {factor: levels[0] for factor, levels in LEVELS.items()}
     second = {factor: levels[1] for factor, levels in LEVELS.items()} | {"generator": generator}
-    return Cell(
-        **{
-            factor: second[factor] if factor in switched else levels[0]
-            for factor, levels in LEVELS.items()
-        }
-    ).name
+    return Cell(**first | {factor: second[factor] for factor in switched}).name
 
 
 def shares(values: "pd.DataFrame", generator: str) -> dict[str, Any]:
@@ -132,10 +127,11 @@ def shares(values: "pd.DataFrame", generator: str) -> dict[str, Any]:
         values: The outcome; replicates in rows and cells in columns.
         generator: The generator that replaces the paper's GAN.
     """
-    subsets = [
-        each for size in range(len(LEVELS) + 1) for each in itertools.combinations(LEVELS, size)
-    ]
-    worth = {frozenset(each): values[corner(each, generator)] for each in subsets}
+    worth = {
+        frozenset(switched): values[corner(switched, generator)]
+        for size in range(len(LEVELS) + 1)
+        for switched in itertools.combinations(LEVELS, size)
+    }
     every = frozenset(LEVELS)
     return {
         "paper": mean_interval(worth[frozenset()]),

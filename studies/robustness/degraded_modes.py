@@ -63,11 +63,13 @@ class DegradedModes:
 
     def _tables(self) -> dict[str, list[dict[str, object]]]:
         methods = self._methods()
-        unit = float(np.std(self._pairs(None, self.settings.modes.num_windows, "unit")[1]))
+        num_windows = self.settings.modes.num_windows
+        unit = float(np.std(self._pairs(None, num_windows, "unit")[1]))
         cells = []
         told = self.stages.progress.loop("mode and severity", len(TRIED))
         for done, (mode, severity) in enumerate(TRIED, 1):
-            coarse, truth = self._test_pairs(mode, severity)
+            scenario = None if mode == "nominal" else Degraded(mode, severity)
+            coarse, truth = self._pairs(scenario, num_windows, f"test {mode} {severity}")
             for method, estimate in methods.items():
                 error = (
                     float(np.sqrt(np.mean((estimate(coarse) - truth) ** 2, dtype=np.float64)))
@@ -77,10 +79,6 @@ class DegradedModes:
                 cells.append(cell | {"seed": self.settings.seed})
             told(done)
         return {"degraded": cells}
-
-    def _test_pairs(self, mode: str, severity: float) -> tuple[np.ndarray, np.ndarray]:
-        scenario = None if mode == "nominal" else Degraded(mode, severity)
-        return self._pairs(scenario, self.settings.modes.num_windows, f"test {mode} {severity}")
 
     def _pairs(
         self, scenario: Degraded | None, num_windows: int, purpose: str
@@ -92,19 +90,20 @@ class DegradedModes:
         chance = int(self.example.draw(purpose).integers(2**31))
         begins = np.random.default_rng(chance).integers(0, 10**6, num_windows)
         times = chosen.interval * (begins[:, None] + np.arange(chosen.window, dtype=np.float64))
-        size = chosen.orbit_amplitude + chosen.rotation_amplitude
-        shortest = min(chosen.orbit_period, chosen.rotation_period)
-        coarse = self.example.coarse.simulate(times, scenario, np.random.default_rng(chance + 1))
+        simulator = self.example.coarse
+        coarse = simulator.simulate(times, scenario, np.random.default_rng(chance + 1))
         if scenario is None:
             return coarse, self.example.truth(times).astype(np.float32)
-        how = (
+        truth = degrade(
+            self.example.truth,
+            times,
             scenario.mode,
             scenario.severity,
-            (-size, size),
-            shortest,
+            simulator.levels,
+            min(chosen.orbit_period, chosen.rotation_period),
             np.random.default_rng(chance + 1),
+            scenario.first_sample(chosen.window),
         )
-        truth = degrade(self.example.truth, times, *how, scenario.first_sample(chosen.window))
         return coarse, truth.astype(np.float32)
 
     def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:
