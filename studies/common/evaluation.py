@@ -18,7 +18,7 @@ from enhsim_tf.datasets.anomalies import INJECTIONS
 from enhsim_tf.scoring.metrics import recall, threshold
 from enhsim_tf.telemetry.windows import time_blocks
 from studies.common.detectors import Detector
-from studies.common.injections import DURATIONS, SEVERITIES, inject
+from studies.common.injections import SEVERITIES, inject_durations
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,22 +70,11 @@ def make_trial(
         rate: Nominal false-alarm rate of the thresholds.
     """
     chosen = nominal[np.linspace(0, len(nominal) - 1, min(num_anomalous, len(nominal))).astype(int)]
-    durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
-    anomalous = {}
-    for kind in INJECTIONS:
-        for severity in SEVERITIES:
-            parts = [
-                inject(
-                    chosen[number :: len(durations)],
-                    kind,
-                    severity,
-                    duration,
-                    noise_sd,
-                    np.random.default_rng([seed, number]),
-                )[0]
-                for number, duration in enumerate(durations)
-            ]
-            anomalous[kind, severity] = np.concatenate(parts)
+    anomalous = {
+        (kind, severity): inject_durations(chosen, kind, severity, noise_sd, [seed])
+        for kind in INJECTIONS
+        for severity in SEVERITIES
+    }
     return Trial(nominal, reference, anomalous, rate)
 
 

@@ -1,5 +1,7 @@
 """Anomalies in windows, one in each, with the severities and durations of the experiments."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
@@ -51,3 +53,30 @@ def inject(
     anomalous[rows, columns[:, ::step]] = pieces[:, ::step]
     mask[rows, columns[:, ::step]] = True
     return anomalous, mask
+
+
+def inject_durations(
+    windows: np.ndarray, kind: str, severity: float, noise_sd: float, seed: Sequence[int]
+) -> np.ndarray:
+    """Injects one anomaly into each window, see `inject`. The durations alternate between windows,
+    which are returned duration by duration; those longer than a window have its length.
+
+    Args:
+        windows: Nominal windows, shape `(windows, samples)`.
+        kind: Kind of the anomaly.
+        severity: Severity of the anomaly.
+        noise_sd: Standard deviation of the noise.
+        seed: Seed for the positions, to which the number of the duration is added.
+    """
+    parts = [
+        inject(
+            windows[number :: len(DURATIONS)],
+            kind,
+            severity,
+            min(duration, windows.shape[1]),
+            noise_sd,
+            np.random.default_rng([*seed, number]),
+        )[0]
+        for number, duration in enumerate(DURATIONS)
+    ]
+    return np.concatenate(parts)

@@ -251,11 +251,10 @@ def make_settings(budget: str = "full", **changed: Any) -> Settings:
         if dataclasses.is_dataclass(field.default)
     }
     for name, kind in groups.items():
-        fields = {field.name: field.metadata["smoke"] for field in dataclasses.fields(kind)}
         smaller = {
-            field: count
-            for field, count in fields.items()
-            if budget == "smoke" and count is not None
+            field.name: field.metadata["smoke"]
+            for field in dataclasses.fields(kind)
+            if budget == "smoke" and field.metadata["smoke"] is not None
         }
         made[name] = kind(**smaller | values.pop(name, {}))
     if values:

@@ -18,7 +18,7 @@ from enhsim_tf.telemetry.series import Telemetry
 from studies.common.detectors import DETECTORS
 from studies.common.evaluation import cross_fitted_scores, recall_at_real_rate
 from studies.common.example import coarse_simulator, draw_noise
-from studies.common.injections import DURATIONS, inject
+from studies.common.injections import inject_durations
 from studies.common.settings import Settings
 from studies.common.tables import stage_tables
 from studies.few_windows.record import (
@@ -96,17 +96,13 @@ class World:
         windows = cut_windows(self.values, starts, self.window)
         nominal = windows[: counts.num_judged]
         reference = windows[counts.num_judged :]
-        parts = []
-        for number, kind in enumerate(INJECTIONS):
-            chosen = nominal[np.linspace(0, len(nominal) - 1, counts.num_anomalous).astype(int)]
-            for offset, duration in enumerate(DURATIONS):
-                rng = np.random.default_rng([self.settings.seed, _ANOMALIES, number, offset])
-                pieces = chosen[offset :: len(DURATIONS)]
-                parts.append(
-                    inject(pieces, kind, SEVERITY, min(duration, self.window), self.noise_sd, rng)[
-                        0
-                    ]
-                )
+        chosen = nominal[np.linspace(0, len(nominal) - 1, counts.num_anomalous).astype(int)]
+        parts = [
+            inject_durations(
+                chosen, kind, SEVERITY, self.noise_sd, [self.settings.seed, _ANOMALIES, number]
+            )
+            for number, kind in enumerate(INJECTIONS)
+        ]
         return {"nominal": nominal, "reference": reference, "anomalous": np.concatenate(parts)}
 
     def tables(self, stages: Stages) -> "dict[str, pd.DataFrame]":

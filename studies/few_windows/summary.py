@@ -49,21 +49,18 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
     for environment in dict.fromkeys(rows["environment"]):
         own = rows[rows["environment"] == environment]
         curves = {arm: _curve(own[own["arm"] == arm], numbers) for arm in dict.fromkeys(own["arm"])}
+        pays = {arm: _pays(own, arm, numbers) for arm in curves if arm != REAL}
         excess = curves[REAL]["excess"]
-        suffices = [
-            number
-            for number in numbers
-            if all(excess[str(n)] <= SUFFICES for n in numbers if n >= number)
-        ]
+        suffices = None
+        for number in reversed(numbers):
+            if excess[str(number)] > SUFFICES:
+                break
+            suffices = number
         environments[environment] = {
             "arms": curves,
-            "pays": {arm: _pays(own, arm, numbers) for arm in curves if arm.startswith(SIMULATOR)},
-            "others_pay": {
-                arm: _pays(own, arm, numbers)
-                for arm in curves
-                if arm != REAL and not arm.startswith(SIMULATOR)
-            },
-            "real_suffices_from": suffices[0] if suffices else None,
+            "pays": {arm: at for arm, at in pays.items() if arm.startswith(SIMULATOR)},
+            "others_pay": {arm: at for arm, at in pays.items() if not arm.startswith(SIMULATOR)},
+            "real_suffices_from": suffices,
         }
     return {
         "environments": environments,
@@ -92,13 +89,9 @@ def _pays(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> list[int]:
     real = _curve(rows[(rows["arm"] == REAL) & rows["seed"].isin(own["seed"].unique())], numbers)
     its = _curve(own, numbers)
     found = []
-    for number in numbers:
-        at = str(number)
-        if at in its["excess"] and real["excess"][at] > SUFFICES:
-            loss = real["recall_at_real_rate"][at] - its["recall_at_real_rate"][at]
-            if (
-                max(its["excess"][at], 0) <= PAYS_SHARE * real["excess"][at]
-                and loss <= MAX_RECALL_LOSS
-            ):
-                found.append(number)
+    for at, excess in its["excess"].items():
+        loss = real["recall_at_real_rate"][at] - its["recall_at_real_rate"][at]
+        most = PAYS_SHARE * real["excess"][at]
+        if real["excess"][at] > SUFFICES and max(excess, 0) <= most and loss <= MAX_RECALL_LOSS:
+            found.append(int(at))
     return found

@@ -103,23 +103,18 @@ class Fault(NamedTuple):
     interval_s: float
 
 
-_EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-_BATTERY = _EXAMPLES / "battery"
-_AIRCRAFT = _EXAMPLES / "aircraft"
+def _recorded(name: str, window: str, begin_s: float, interval_s: float) -> Fault:
+    """The fault of a recorded pair in `examples`."""
+    folder = Path(__file__).resolve().parents[2] / "examples" / name
+    nominal = (folder / "telemetry.csv", "--coarse", folder / "simulator.csv", "--window", window)
+    faulty = (folder / "telemetry_fault.csv", "--coarse", folder / "simulator_planned.csv")
+    return Fault(nominal, faulty, begin_s, interval_s)
+
+
 FAULTS: Mapping[str, Fault] = {
     "heater": Fault((example("nominal.csv"),), (example("new.csv"),), 400.0, 1.0),
-    "battery": Fault(
-        (_BATTERY / "telemetry.csv", "--coarse", _BATTERY / "simulator.csv", "--window", "100"),
-        (_BATTERY / "telemetry_fault.csv", "--coarse", _BATTERY / "simulator_planned.csv"),
-        5_700.0,
-        10.0,
-    ),
-    "aircraft": Fault(
-        (_AIRCRAFT / "telemetry.csv", "--coarse", _AIRCRAFT / "simulator.csv", "--window", "120"),
-        (_AIRCRAFT / "telemetry_fault.csv", "--coarse", _AIRCRAFT / "simulator_planned.csv"),
-        300.0,
-        1.0,
-    ),
+    "battery": _recorded("battery", "100", 5_700.0, 10.0),
+    "aircraft": _recorded("aircraft", "120", 300.0, 1.0),
 }
 
 

@@ -111,19 +111,19 @@ def view_rows(series: Series, settings: Settings, seed: int) -> list[dict[str, A
     rate = settings.public_benchmarks.false_alarm_rate
     simulators = Simulators(seed)
     window = window_of(series.nominal)
-    rows = [{"method": TOOL} | judge_tool(series, simulators, window, rate)]
-    uses = {
-        TELEMETRY: (Views, series),
-        GENERATED: (functools.partial(Generated, simulators), series),
-        DIFFERENCE: (Views, simulators.difference(series)),
-    }
-    for name, (make, judged) in uses.items():
-        rows.append({"method": name} | judge_method(make, judged, window, rate))
-    tried = settings_of_views(series.nominal.shape[1])
-    for setting, make in itertools.islice(tried.items(), settings.public_benchmarks.num_tried):
-        judged = judge_method(make, series, window, rate)
-        rows.append({"method": CHOSEN, "setting": setting} | judged)
-    return [{"setting": ""} | row for row in rows]
+    rows = [{"setting": "", "method": TOOL} | judge_tool(series, simulators, window, rate)]
+    uses = [
+        (TELEMETRY, "", Views, series),
+        (GENERATED, "", functools.partial(Generated, simulators), series),
+        (DIFFERENCE, "", Views, simulators.difference(series)),
+    ]
+    tried = settings_of_views(series.nominal.shape[1]).items()
+    for setting, make in itertools.islice(tried, settings.public_benchmarks.num_tried):
+        uses.append((CHOSEN, setting, make, series))
+    for name, setting, make, judged in uses:
+        row = judge_method(make, judged, window, rate)
+        rows.append({"setting": setting, "method": name} | row)
+    return rows
 
 
 def peer_rows(series: Series, settings: Settings, seed: int) -> list[dict[str, Any]]:
