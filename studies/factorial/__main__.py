@@ -11,9 +11,8 @@ from studies.common.noise_processes import NOISES
 def tables_of(options: Namespace, settings: Any, stages: Any) -> dict[str, Any]:
     """The table of one kind of noise and seed."""
     from studies.factorial.pipelines import Pipelines
-    from studies.robustness.replicate import Replicate
 
-    return Pipelines(Replicate(settings, stages)).tables()
+    return Pipelines(settings, stages).tables
 
 
 description = (

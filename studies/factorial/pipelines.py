@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.common.atomic_files import write_json
-from enhsim_tf.common.stages import load_arrays, save_arrays
+from enhsim_tf.common.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
@@ -20,6 +20,7 @@ from enhsim_tf.telemetry.windows import random_window_starts
 from studies.common import detectors, evaluation
 from studies.common.gaussian_noise import GaussianAutoregression
 from studies.common.paper_gan import PaperGAN
+from studies.common.settings import Settings
 from studies.common.tables import stage_tables
 from studies.factorial.cells import (
     AUTOREGRESSION,
@@ -45,19 +46,17 @@ THRESHOLD = "arms, threshold"
 """Purposes of windows: to train a detector, and to set its threshold."""
 
 
-class Pipelines:
-    """All cells of one environment and seed. Networks are trained when they are first needed.
+class Pipelines(Replicate):
+    """All cells of one environment and seed, with the data and the paper's networks of the study of
+    robustness. Networks are trained when they are first needed.
 
     Args:
-        replicate: The replicate of the study of robustness that provides the data and the paper's
-            networks.
+        settings: All settings.
+        stages: Runs stages and caches their results.
     """
 
-    def __init__(self, replicate: Replicate):
-        self.replicate = replicate
-        self.settings = replicate.settings
-        self.stages = replicate.stages
-        self.example = replicate.example
+    def __init__(self, settings: Settings, stages: Stages):
+        super().__init__(settings, stages)
         self.window = self.settings.paper.window
         self.seed = self.settings.seed
         self.enhancer = functools.cache(self._enhancer)
@@ -65,6 +64,7 @@ class Pipelines:
         # the last one is kept, because both purposes and some cells share it
         self._fitted = functools.lru_cache(maxsize=1)(self._fit)
 
+    @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The table `cells`. The cells whose noise is learnt from the same windows are a stage, so
         that an interrupted run goes on.
@@ -101,7 +101,7 @@ class Pipelines:
 
     @functools.cached_property
     def _trial(self) -> evaluation.Trial:
-        return self.replicate.trial()
+        return self.trial()
 
     def judged(self, cell: str | Cell) -> list[dict[str, object]]:
         """Trains the detectors on a cell or a reference and judges them on real telemetry.

@@ -12,7 +12,7 @@ def tables_of(options: Namespace, settings: Any, stages: Any) -> dict[str, Any]:
     """The tables of one family of noise and seed."""
     from studies.noise_models.cells import Cell
 
-    return Cell(settings, stages).tables()
+    return Cell(settings, stages).tables
 
 
 description = "Tries noise models on fourteen families of noise."

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.common.stages import Stages
 from studies.common import evaluation
 from studies.common.detectors import DETECTORS
 from studies.common.gaussian_noise import CANDIDATES, Draw, fit_candidate
-from studies.common.settings import Settings
 from studies.common.tables import stage_tables
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 from studies.noise_models.real_floor import RealFloor, Row
@@ -41,20 +39,12 @@ _STREAMS = {
 _DRAW = 71
 
 
-class Cell:
-    """A family of noise and a seed.
-
-    Args:
-        settings: All settings; `noise` is the family.
-        stages: Runs stages and caches their results.
+class Cell(Replicate):
+    """A family of noise and a seed, with the telemetry and the test data of the study of
+    robustness; `noise` of the settings is the family.
     """
 
-    def __init__(self, settings: Settings, stages: Stages):
-        self.settings = settings
-        self.stages = stages
-        self.one = Replicate(settings, stages)
-        self.example = self.one.example
-
+    @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The tables of real windows and of all models; each is a stage of its own, so that an
         interrupted run goes on.
@@ -142,7 +132,7 @@ class Cell:
         """False alarms and recall of every detector, trained on the first windows, with the
         threshold of the second ones.
         """
-        trial = self.one.trial(self.settings.noise_models.num_anomalous)
+        trial = self.trial(self.settings.noise_models.num_anomalous)
         judged = evaluation.evaluate_arm(*arms, trial, DETECTORS, self.settings.seed)
         return evaluation.by_detector(judged)
 

@@ -15,11 +15,10 @@ def tables_of(options: Namespace, settings: Any, stages: Any) -> dict[str, Any]:
     noise.
     """
     from studies.robustness.degraded_modes import DegradedModes
-    from studies.robustness.replicate import Replicate
 
-    one = Replicate(settings, stages)
+    one = DegradedModes(settings, stages)
     is_first = settings.noise == options.environments[0]
-    return one.tables | ({"degraded": DegradedModes(one).table} if is_first else {})
+    return one.tables | ({"degraded": one.degraded} if is_first else {})
 
 
 description = "Trains detectors with each kind of noise and counts false alarms and finds."

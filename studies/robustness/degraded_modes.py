@@ -36,20 +36,11 @@ TRIED = (("nominal", 0.0), *((mode, severity) for mode in MODES for severity in 
 Estimate = Callable[[np.ndarray], np.ndarray]
 
 
-class DegradedModes:
-    """All methods, modes and severities of one replicate.
-
-    Args:
-        replicate: The replicate, which has trained the paper's enhancer.
-    """
-
-    def __init__(self, replicate: Replicate):
-        self.settings = replicate.settings
-        self.stages = replicate.stages
-        self.example = replicate.example
+class DegradedModes(Replicate):
+    """A replicate with the test of all methods, modes and severities."""
 
     @functools.cached_property
-    def table(self) -> "pd.DataFrame":
+    def degraded(self) -> "pd.DataFrame":
         """The error of each method, mode and severity, in standard deviations of the nominal
         signal.
         """

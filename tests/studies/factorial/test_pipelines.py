@@ -14,7 +14,6 @@ from studies.factorial.__main__ import command
 from studies.factorial.cells import CELLS, DETECTORS, REFERENCES, Cell
 from studies.factorial.pipelines import THRESHOLD, TRAINING, Pipelines
 from studies.factorial.summary import KEPT
-from studies.robustness.replicate import Replicate
 
 SMALL = {"paper__num_windows": 40, "second__num_windows": 90, "robustness__num_windows": 30}
 SMALL |= {"paper__iterations": 2, "paper__record_every": 1}
@@ -22,9 +21,7 @@ SMALL |= {"paper__iterations": 2, "paper__record_every": 1}
 
 @pytest.fixture(scope="module")
 def without_networks(tmp_path_factory):
-    return Pipelines(
-        Replicate(make_settings("smoke", **SMALL), Stages(tmp_path_factory.mktemp("cache")))
-    )
+    return Pipelines(make_settings("smoke", **SMALL), Stages(tmp_path_factory.mktemp("cache")))
 
 
 def test_whole_windows_of_the_residual_are_added_to_the_signal(without_networks):
@@ -57,7 +54,7 @@ def test_training_windows_are_those_of_the_two_pipelines_and_arms_are_repeatable
     )
     first, other = (one.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
     assert first.shape == other.shape == (30, 500) and not np.allclose(first, other)
-    assert np.array_equal(Pipelines(one.replicate).arm(cell, TRAINING), first)
+    assert np.array_equal(Pipelines(one.settings, one.stages).arm(cell, TRAINING), first)
 
 
 def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_path, monkeypatch):
@@ -83,7 +80,7 @@ def test_a_cell_of_each_network_is_its_signal_and_noise_on_the_windows_of_the_co
     tmp_path,
 ):
     settings = make_settings("smoke", paper__hidden_units=64, **SMALL).of("shot", 0)
-    one = Pipelines(Replicate(settings, Stages(tmp_path)))
+    one = Pipelines(settings, Stages(tmp_path))
     coarse = one.arm("coarse", TRAINING)
     for cell, enhance in (
         (Cell("few", "moving average", "network", "paper's GAN"), one.example.enhance),
