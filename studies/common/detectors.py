@@ -6,6 +6,7 @@ standard deviations. Where windows are seen channel by channel, a single channel
 axis. Keras is imported only when an autoencoder is trained.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -56,14 +57,14 @@ class LimitCheck:
         return beyond.reshape(len(windows), -1).max(axis=1)
 
 
+@dataclasses.dataclass
 class PCAResidual:
     """Residual of a window outside so many principal components of the training windows, also known
     as Sub-PCA.
     """
 
-    def __init__(self, num_components: int = 20, seed: int = 0):
-        self.num_components = num_components
-        self.seed = seed
+    num_components: int = 20
+    seed: int = 0
 
     def fit(self, windows: np.ndarray) -> "PCAResidual":
         """Computes the principal components of nominal windows."""
@@ -154,11 +155,11 @@ def features(windows: np.ndarray) -> np.ndarray:
     )
 
 
+@dataclasses.dataclass
 class IsolationForestOnFeatures:
     """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`."""
 
-    def __init__(self, seed: int = 0):
-        self.seed = seed
+    seed: int = 0
 
     def fit(self, windows: np.ndarray) -> "IsolationForestOnFeatures":
         """Fits the forest to nominal windows."""
@@ -174,11 +175,11 @@ class IsolationForestOnFeatures:
         return -self._forest.score_samples(features(windows))
 
 
+@dataclasses.dataclass
 class NearestNeighbours:
     """Mean Euclidean distance of a window to so many nearest training windows."""
 
-    def __init__(self, num_neighbours: int = 5):
-        self.num_neighbours = num_neighbours
+    num_neighbours: int = 5
 
     def fit(self, windows: np.ndarray) -> "NearestNeighbours":
         """Stores the nominal windows."""

@@ -16,6 +16,7 @@ run:
   which the map whitens better than others; thresholds were too high.
 """
 
+import dataclasses
 import functools
 from collections.abc import Callable
 
@@ -38,6 +39,7 @@ NUM_BLOCKS = 5  # of time, for cross-fitting
 _START_RANGE = 1_000_000  # generated windows begin at a random sample below this one
 
 
+@dataclasses.dataclass
 class Record:
     """A contiguous record of real telemetry, and the simulator that is fitted to it.
 
@@ -49,16 +51,15 @@ class Record:
         seed: Seed of everything that is drawn or trained.
     """
 
-    def __init__(
-        self, telemetry: Telemetry, coarse: SquareWaveSimulator, window: int, most: int, seed: int
-    ):
-        self.telemetry = telemetry
-        self.coarse = coarse
-        self.window = window
-        self.most = most
-        self.seed = seed
-        self.starts = evenly_spaced_starts([telemetry], window, most)
-        self.windows = cut_windows(telemetry.values[:, 0], self.starts, window)
+    telemetry: Telemetry
+    coarse: SquareWaveSimulator
+    window: int
+    most: int
+    seed: int
+
+    def __post_init__(self):
+        self.starts = evenly_spaced_starts([self.telemetry], self.window, self.most)
+        self.windows = cut_windows(self.telemetry.values[:, 0], self.starts, self.window)
 
     def _coarse(self, starts: np.ndarray) -> np.ndarray:
         return self.coarse.simulate(

@@ -2,6 +2,7 @@
 and its threshold is set on nominal blocks that it has not learnt.
 """
 
+import dataclasses
 import itertools
 import time
 from collections.abc import Callable
@@ -62,6 +63,7 @@ def sample_scores(scores: np.ndarray, num_samples: int, window: int) -> SampleSc
     return SampleScores(whole, np.append(-np.inf, scores)[ended])
 
 
+@dataclasses.dataclass
 class OnWindows:
     """A detector of windows, in units of the nominal standard deviation of each channel.
 
@@ -71,10 +73,9 @@ class OnWindows:
         is_centred: Whether the mean of each window and channel is removed.
     """
 
-    def __init__(self, detector: Detector, window: int, is_centred: bool = False):
-        self.detector = detector
-        self.window = window
-        self.is_centred = is_centred
+    detector: Detector
+    window: int
+    is_centred: bool = False
 
     def fit(self, nominal: np.ndarray) -> "OnWindows":
         """Learns all windows without NaN."""
