@@ -128,19 +128,17 @@ class Judge:
         """Judges the root-mean-square residual of each window. Its threshold comes from the orbits
         that the simulator is fitted to.
         """
-        scores: dict[str, dict[Fault | None, np.ndarray]] = {ENHANCED_RUN: {}, COARSE_RUN: {}}
+        enhanced: dict[Fault | None, np.ndarray] = {}
+        coarse: dict[Fault | None, np.ndarray] = {}
         for fault, telemetry in self.test.items():
             planned = judged_windows(self.runs, fault, self.seed, is_planned=True).coarse
-            scores[ENHANCED_RUN][fault] = _rms(telemetry - self.enhance(planned))
-            scores[COARSE_RUN][fault] = _rms(telemetry - planned[:, :, 0])
-        fitted = {
-            ENHANCED_RUN: self.residuals,
-            COARSE_RUN: self.pairs.telemetry - self.pairs.coarse[:, :, 0],
-        }
+            enhanced[fault] = _rms(telemetry - self.enhance(planned))
+            coarse[fault] = _rms(telemetry - planned[:, :, 0])
+        fitted_enhanced = _rms(self.residuals)
+        fitted_coarse = _rms(self.pairs.telemetry - self.pairs.coarse[:, :, 0])
         return [
-            row
-            for name, each in scores.items()
-            for row in alarm_rows(name, "residual", _rms(fitted[name]), each)
+            *alarm_rows(ENHANCED_RUN, "residual", fitted_enhanced, enhanced),
+            *alarm_rows(COARSE_RUN, "residual", fitted_coarse, coarse),
         ]
 
 

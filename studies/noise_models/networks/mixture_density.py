@@ -17,6 +17,7 @@ References:
     Hutter, "Decoupled weight decay regularization", 2019.
 """
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -60,6 +61,7 @@ _LOG_CONSTANTS = (
 )
 
 
+@dataclasses.dataclass
 class MixtureDensityNoise:
     """Noise whose samples are drawn one after the other from the densities that a network predicts.
 
@@ -68,9 +70,8 @@ class MixtureDensityNoise:
         num_steps: Steps of the training.
     """
 
-    def __init__(self, seed: int = 0, num_steps: int = 600):
-        self.seed = seed
-        self.num_steps = num_steps
+    seed: int = 0
+    num_steps: int = 600
 
     def fit(
         self, noise: np.ndarray, signal: np.ndarray | None = None, starts: np.ndarray | None = None
@@ -99,6 +100,7 @@ class MixtureDensityNoise:
             )
         self._levels = Levels.find(noise)
         self._past = self.window // 2
+        self._spans = 2 ** np.arange(1, int(np.log2(self._past)) + 1)
         self._limit = _LIMIT * float(np.max(np.abs(noise))) / self.scale
         if self._levels is not None:
             noise = noise + self._levels.step * (rng.random(noise.shape) - 0.5)
@@ -115,8 +117,8 @@ class MixtureDensityNoise:
         judged = self._examples(values, below, held_out, _NUM_JUDGED, rng)
         self.network = _build(
             *self._examples(values, below, learnt, _NUM_LINEAR, rng),
-            self._num_linear,
-            self._num_far,
+            len(self._spans),
+            max(0, min(_NUM_LAGS, self._past) - _NUM_NEAR),
             self.seed,
         )
         self._train(lambda: self._examples(values, below, learnt, _BATCH, rng), judged)
@@ -236,15 +238,13 @@ class MixtureDensityNoise:
             samples first, then the logarithms of magnitudes.
         """
         backwards = seen[:, ::-1]
-        spans = 2 ** np.arange(1, int(np.log2(self._past)) + 1)
+        spans = self._spans
         means = np.cumsum(backwards, axis=1)[:, spans - 1] / spans
         magnitudes = np.cumsum(np.abs(backwards), axis=1)[:, spans - 1] / spans
         linear = [seen[:, -_NUM_LAGS:], means]
         if below is not None:
             around = np.clip(np.reshape(places, (-1, 1)) + _SIGNAL_LAGS, 0, self.window - 1)
             linear.append(below[rows[:, None], around])
-        self._num_linear = sum(each.shape[1] for each in linear)
-        self._num_far = max(0, linear[0].shape[1] - _NUM_NEAR)
         return np.concatenate([*linear, np.log(magnitudes + _TINY)], axis=1).astype(np.float32)
 
 
@@ -259,15 +259,16 @@ def _split(starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _build(
-    inputs: np.ndarray, targets: np.ndarray, num_linear: int, num_far: int, seed: int
+    inputs: np.ndarray, targets: np.ndarray, num_magnitudes: int, num_far: int, seed: int
 ) -> keras.Model:
     """Builds the network, which starts as one density around the linear prediction of least
     squares.
 
-    The linear prediction sees the first `num_linear` inputs; the hidden layers do not see the first
-    `num_far`. The output, of shape `(samples, 3 * components)`, holds logits, means and logarithms
-    of the scales.
+    The linear prediction does not see the last `num_magnitudes` inputs, and the hidden layers do
+    not see the first `num_far`. The output, of shape `(samples, 3 * components)`, holds logits,
+    means and logarithms of the scales.
     """
+    num_linear = inputs.shape[1] - num_magnitudes
     mean = inputs.mean(axis=0, dtype=np.float64)
     deviation = inputs.std(axis=0, dtype=np.float64) + 1e-6
     known = np.column_stack(
