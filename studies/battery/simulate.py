@@ -117,34 +117,25 @@ def simulate(
     clock = np.arange(len(current)) * INTERVAL_S
     begun = onset * INTERVAL_S
     kinks = clock[np.flatnonzero(np.abs(np.diff(current, 2)) > _KINK_A) + 1]
-    stops = np.unique(
-        np.concatenate(
-            [
-                [0.0],
-                kinks,
-                [time_s for time_s in (begun, begun + _ONSET_S) if time_s < clock[-1]],
-                clock[-1:],
-            ]
-        )
-    )
+    stops = np.unique([0.0, *kinks, begun, begun + _ONSET_S, clock[-1]])
+    stops = stops[stops <= clock[-1]]
     simulation = _build(model, current, clock, regime, begun)
-    found = []
-    for fault in faults:
+
+    def run_under(fault: Fault | None) -> np.ndarray | None:
         try:
             solution = simulation.solve(stops, t_interp=clock, inputs=simulator_inputs(fault))
             times = solution.t
             volts = solution[_VOLTAGE].data
             kelvins = solution[_TEMPERATURE].data
         except pybamm.SolverError:
-            found.append(None)
-            continue
+            return None
         if times[-1] < clock[-1] or not np.isfinite([*volts, *kelvins]).all():  # stopped at a limit
-            found.append(None)
-            continue
+            return None
         volts = np.interp(clock, times, volts) + drift_under(len(clock), fault, onset)
         celsius = np.interp(clock, times, kelvins) - _ZERO_K
-        found.append(np.stack([volts, current, celsius], axis=1).astype(np.float32))
-    return found
+        return np.stack([volts, current, celsius], axis=1).astype(np.float32)
+
+    return [run_under(fault) for fault in faults]
 
 
 def _build(

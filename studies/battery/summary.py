@@ -9,7 +9,7 @@ import numpy as np
 
 from studies.battery.detectors import REAL_120, WITH_RESIDUALS
 from studies.common.statistics import mean_interval
-from studies.common.tables import KeptTables
+from studies.common.tables import KeptTables, seeds_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +34,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     """
     alarms = tables["alarms"].astype({"alarms": np.float64, "severity": np.float64})
     return {
-        "seeds": sorted(set(alarms["seed"].tolist())),
+        "seeds": seeds_of(alarms),
         "regimes": {
             regime: {
                 "uses": {

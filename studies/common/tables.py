@@ -43,6 +43,11 @@ def stage_tables(
     return {path.stem: pd.read_parquet(path) for path in sorted(folder.glob("*.parquet"))}
 
 
+def seeds_of(table: "pd.DataFrame") -> list[int]:
+    """The seeds with which a table was made."""
+    return sorted(set(table["seed"].tolist()))
+
+
 @dataclasses.dataclass(frozen=True)
 class KeptTables:
     """The tables that a study stores, one Parquet file each.
@@ -69,16 +74,14 @@ class KeptTables:
         precision that their counts support.
         """
         for name, table in tables.items():
+            digits = self.digits_of.get(name, self.digits)
             compact = table.reset_index(drop=True)
             for column in compact.columns:
+                values = compact[column]
                 if column in self.labels:
-                    compact[column] = compact[column].astype("category")
-                elif compact[column].dtype == np.float64:
-                    compact[column] = (
-                        compact[column]
-                        .round(self.digits_of.get(name, self.digits))
-                        .astype(np.float32)
-                    )
+                    compact[column] = values.astype("category")
+                elif values.dtype == np.float64:
+                    compact[column] = values.round(digits).astype(np.float32)
             with replace_file(folder / f"{name}.parquet") as temporary:
                 compact.to_parquet(temporary, compression="zstd", index=False)
 

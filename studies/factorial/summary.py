@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from studies.common.noise_processes import NOISES
 from studies.common.statistics import mean_interval, t_interval
-from studies.common.tables import KeptTables
+from studies.common.tables import KeptTables, seeds_of
 from studies.factorial.cells import (
     AUTOREGRESSION,
     CELLS,
@@ -80,7 +80,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     values = averaged(table)
     return {
         "environments": [name for name in NOISES if name in set(table["environment"])],
-        "seeds": sorted(int(seed) for seed in table["seed"].unique()),
+        "seeds": seeds_of(table),
         "num_windows": int(table["windows"].median()),
         "detectors": list(DETECTORS),
         "cells": {

@@ -9,7 +9,7 @@ were set for. Recall is compared at the matched rate, with a threshold from othe
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from studies.common.tables import KeptTables
+from studies.common.tables import KeptTables, seeds_of
 from studies.few_windows.record import REAL, SIMULATOR
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
     return {
         "environments": environments,
         "numbers": numbers,
-        "seeds": sorted({int(seed) for seed in rows["seed"]}),
+        "seeds": seeds_of(rows),
     }
 
 

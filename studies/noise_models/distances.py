@@ -197,9 +197,7 @@ def _inside(generated_features: np.ndarray, real_features: np.ndarray) -> np.nda
     """Whether each generated window lies in each real neighbourhood, shape `(generated, real)`."""
     from scipy.spatial.distance import cdist
 
-    generated, real = (
-        _standardised(features, real_features) for features in (generated_features, real_features)
-    )
+    generated, real = _standardised(generated_features, real_features)
     # index 0 is the window itself
     reach = np.partition(cdist(real, real, "sqeuclidean"), _NUM_NEIGHBOURS, axis=1)[
         :, _NUM_NEIGHBOURS
@@ -216,9 +214,7 @@ def mmd_squared(generated_features: np.ndarray, real_features: np.ndarray) -> fl
     """
     from scipy.spatial.distance import pdist, squareform
 
-    generated, real = (
-        _standardised(features, real_features) for features in (generated_features, real_features)
-    )
+    generated, real = _standardised(generated_features, real_features)
     bandwidth = max(np.median(pdist(real, "sqeuclidean")), 1e-12)
     number = len(generated)
     other = len(real)
@@ -231,5 +227,7 @@ def mmd_squared(generated_features: np.ndarray, real_features: np.ndarray) -> fl
     return float(within + within_real - 2 * kernel[:number, number:].mean())
 
 
-def _standardised(features: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    return StandardScaler().fit(reference).transform(features)
+def _standardised(generated: np.ndarray, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both features in units of the mean and standard deviation of the real ones."""
+    scaler = StandardScaler().fit(real)
+    return scaler.transform(generated), scaler.transform(real)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.common.noise_processes import LOOKED_AT
-from studies.common.tables import KeptTables
+from studies.common.tables import KeptTables, seeds_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,7 +58,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         }
         families[family] = {"looked_at": family in LOOKED_AT, "models": found}
     return {
-        "seeds": sorted({int(seed) for seed in tables["detectors"]["seed"]}),
+        "seeds": seeds_of(tables["detectors"]),
         "families": families,
         "models": {
             name: _over_families(

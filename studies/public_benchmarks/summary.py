@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from studies.common.command import PUBLISHED
 from studies.common.statistics import holm, paired_difference, t_interval
-from studies.common.tables import KeptTables
+from studies.common.tables import KeptTables, seeds_of
 from studies.public_benchmarks.arms import CHOSEN, DIFFERENCE, GENERATED, TELEMETRY
 from studies.public_benchmarks.onsets import GROUPS
 from studies.public_benchmarks.peers import PEERS
@@ -69,7 +69,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
             for data_set, each in development.groupby("data_set", sort=False)
         },
         "onsets": _onsets(tables["onsets"]),
-        "seeds": sorted(set(rows["seed"].tolist())),
+        "seeds": seeds_of(rows),
     }
 
 

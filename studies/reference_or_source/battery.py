@@ -106,7 +106,5 @@ class Battery:
         """
         noise = (SENSOR_NOISE_V, SENSOR_NOISE_A, SENSOR_NOISE_C)
         step = (SENSOR_STEP_V, SENSOR_STEP_A, SENSOR_STEP_C)
-        return np.stack(
-            [measure(values[:, each], noise[each], step[each], rng) for each in range(3)],
-            axis=1,
-        )
+        channels = zip(values.T, noise, step, strict=True)
+        return np.stack([measure(*channel, rng) for channel in channels], axis=1)

@@ -43,7 +43,11 @@ def tables(seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> dict[str, pd.Dat
     """
     aircraft = Aircraft()
     found = {}
-    for part, (number, fault) in enumerate(((num_flights, None), (1, FAULT))):
+    parts = (
+        (num_flights, None, "telemetry", "simulator"),
+        (1, FAULT, "telemetry_fault", "simulator_planned"),
+    )
+    for part, (number, fault, of_telemetry, of_simulator) in enumerate(parts):
         rng = np.random.default_rng([seed, part])
         commands = aircraft.draw_commands(number, rng)
         telemetry = aircraft.measure(aircraft.run_real(commands, [fault], rng)[0], rng)
@@ -51,18 +55,8 @@ def tables(seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> dict[str, pd.Dat
         samples = np.arange(len(commands))
         times = samples // aircraft.unit_samples * _PERIOD_S + samples % aircraft.unit_samples
         for name, columns, digits, values in (
-            (
-                "telemetry" if fault is None else "telemetry_fault",
-                aircraft.channels,
-                _TELEMETRY_DIGITS,
-                telemetry,
-            ),
-            (
-                "simulator" if fault is None else "simulator_planned",
-                aircraft.coarse_columns,
-                _SIMULATOR_DIGITS,
-                simulator,
-            ),
+            (of_telemetry, aircraft.channels, _TELEMETRY_DIGITS, telemetry),
+            (of_simulator, aircraft.coarse_columns, _SIMULATOR_DIGITS, simulator),
         ):
             cells = zip(columns, digits, values.T, strict=True)
             table = {

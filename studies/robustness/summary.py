@@ -9,7 +9,7 @@ from studies.common.controls import CONTROLS
 from studies.common.detectors import DETECTORS
 from studies.common.noise_processes import NOISES
 from studies.common.statistics import t_interval
-from studies.common.tables import KeptTables
+from studies.common.tables import KeptTables, seeds_of
 from studies.robustness.degraded_modes import LARGEST_TRAINED, METHODS
 from studies.robustness.replicate import ARMS
 
@@ -47,7 +47,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     environments = [name for name in NOISES if name in set(rate["environment"])]
     return {
         "environments": environments,
-        "seeds": sorted(int(seed) for seed in rate["seed"].unique()),
+        "seeds": seeds_of(rate),
         "num_replicates": int(rate.groupby(REPLICATE).ngroups),
         "num_windows": int(rate["windows"].median()),
         "arms": arms(tables["alarms"], tables["recall"], environments),
@@ -193,7 +193,7 @@ def modes(degraded: "pd.DataFrame") -> dict[str, Any]:
     by_range = degraded.assign(where=where).groupby(["method", "where"])["nrmse"].mean()
     by_mode = degraded.groupby(["method", "mode", "severity"])["nrmse"].mean()
     return {
-        "seeds": sorted(int(seed) for seed in degraded["seed"].unique()),
+        "seeds": seeds_of(degraded),
         "nrmse": {method: by_range[method].to_dict() for method in METHODS},
         "by_mode": {
             method: {
