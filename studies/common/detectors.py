@@ -148,6 +148,21 @@ class MovingDeviation(Control):
         return np.sqrt(np.maximum(square - mean**2, 0).max(axis=(1, 2)))
 
 
+class RandomScore(Control):
+    """Random scores, independent of the windows. Each call continues the random sequence.
+
+    Args:
+        seed: Seed for the scores.
+    """
+
+    def __init__(self, seed: int = 0):
+        self._rng = np.random.default_rng(seed)
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns random numbers that are uniformly distributed between 0 and 1."""
+        return self._rng.random(len(windows))
+
+
 def features(windows: np.ndarray) -> np.ndarray:
     """The features of `window_features` of each channel."""
     return window_features(windows.swapaxes(1, -1).reshape(-1, windows.shape[1])).reshape(
@@ -331,4 +346,12 @@ DETECTORS: dict[str, Callable[[int], Any]] = {
 }
 """Maps a name to a factory, which takes a seed and returns an unfitted detector; the simplest
 first, and the networks last.
+"""
+CONTROLS: dict[str, Callable[[int], Detector]] = {
+    "random score": RandomScore,
+    "largest step": lambda seed: LargestStep(),
+    "moving deviation": lambda seed: MovingDeviation(),
+}
+"""Maps each control's name to a factory, as `DETECTORS`. Every useful detector should outperform
+these trivial scores.
 """

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from studies.common.controls import RandomScore
-from studies.common.detectors import Control
+from studies.common.detectors import Control, RandomScore
 from studies.public_benchmarks.methods import (
     Method,
     OnWindows,

@@ -12,8 +12,7 @@ from enhsim_tf.common.stages import Stages
 from enhsim_tf.enhancer.ridge import Ridge, fit_ridge
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from studies.common import evaluation
-from studies.common.controls import CONTROLS
-from studies.common.detectors import DETECTORS
+from studies.common.detectors import CONTROLS, DETECTORS
 from studies.common.example import Example
 from studies.common.settings import Settings
 from studies.common.tables import stage_tables

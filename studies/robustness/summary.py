@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.common.controls import CONTROLS
-from studies.common.detectors import DETECTORS
+from studies.common.detectors import CONTROLS, DETECTORS
 from studies.common.noise_processes import NOISES
 from studies.common.statistics import t_interval
 from studies.common.tables import KeptTables, seeds_of

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse.degraded import MODES
-from studies.common.controls import CONTROLS
-from studies.common.detectors import DETECTORS
+from studies.common.detectors import CONTROLS, DETECTORS
 from studies.common.settings import make_settings
 from studies.few_windows.cells import QUICK
 from studies.noise_models import cells
