@@ -17,8 +17,8 @@ the residual pipeline (2 epochs, falling learning rate), because the paper's 40 
 ten times as long. The detectors are the five that train in a second.
 """
 
-import dataclasses
 import itertools
+from typing import NamedTuple
 
 FEW = "few"
 MANY = "many"
@@ -49,8 +49,7 @@ DETECTORS = (
 )
 
 
-@dataclasses.dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """A combination of the four factors.
 
     Args:
@@ -68,7 +67,7 @@ class Cell:
     @property
     def name(self) -> str:
         """Name of the cell in tables."""
-        return " / ".join(dataclasses.astuple(self))
+        return " / ".join(self)
 
     @property
     def source(self) -> tuple[str, str, str]:

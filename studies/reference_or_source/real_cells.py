@@ -5,10 +5,9 @@ Prognostics Data Repository, NASA Ames Research Center. A folder holds one file 
 file as published, or a CSV of the discharges with a column `cycle_idx`.
 """
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,8 +46,7 @@ _NEIGHBOURS = 21  # discharges whose median capacity says what is regular
 _REGULAR = 0.85, 1.2  # smallest and largest capacity of a regular discharge, relative to the median
 
 
-@dataclasses.dataclass(frozen=True)
-class Discharge:
+class Discharge(NamedTuple):
     """One discharge while the load is on.
 
     Args:
@@ -66,8 +64,7 @@ class Discharge:
     use: str = ODD
 
 
-@dataclasses.dataclass(frozen=True)
-class AgeingCell:
+class AgeingCell(NamedTuple):
     """A cell and its discharges.
 
     Args:
@@ -208,5 +205,5 @@ def _with_uses(discharges: list[Discharge]) -> tuple[Discharge, ...]:
         if discharge.is_possible and _REGULAR[0] <= relative <= _REGULAR[1]:
             use = KNOWN if known < NUM_KNOWN else JUDGED
             known += 1
-        used.append(dataclasses.replace(discharge, use=use))
+        used.append(discharge._replace(use=use))
     return tuple(used)
