@@ -82,9 +82,8 @@ def _finish(upper: Axes, lower: Axes, numbers: list[int], name: str) -> None:
     upper.set_title(name, loc="left")
     upper.set_yscale("symlog", linthresh=1)
     upper.set_ylim(0, 110)
-    upper.set_yticks(
-        [0, 0.5, 1, 2, 5, 10, 20, 50, 100], ["0", "0.5", "1", "2", "5", "10", "20", "50", "100"]
-    )
+    ticks = [0, 0.5, 1, 2, 5, 10, 20, 50, 100]
+    upper.set_yticks(ticks, map(str, ticks))
     upper.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     lower.set_ylim(0, 100)
     lower.set_xscale("log")

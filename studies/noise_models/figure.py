@@ -69,7 +69,8 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         )
     left.set_xscale("symlog", linthresh=1)
     left.set_xlim(0, 60)
-    left.set_xticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
+    ticks = [0, 0.5, 1, 2, 5, 10, 20, 50]
+    left.set_xticks(ticks, map(str, ticks))
     left.set_xlabel("false alarms (%)")
     right.set_xlim(-8, 8)
     right.set_xlabel("recall lost (points)")

@@ -38,26 +38,19 @@ _LEAST = 2e-4  # smaller rates are drawn here, because the axis is logarithmic
 
 def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     """False alarms by training data, a kind of noise a panel."""
+    environments = found["environments"]
+    columns = min(2, len(environments))
+    rows = -(-len(environments) // columns)
     figure, down = new_sheet(
         DOUBLE,
-        1.3 + 1.7 * -(-len(found["environments"]) // 2),
+        1.3 + 1.7 * rows,
         "Of simulated training data, only residual windows keep false alarms low",
         "False alarms on real nominal windows. Signals without noise (grey, blue), with the "
         "paper's GAN (orange), with residual windows (green), "
         "real telemetry (black). Large mark, bar: mean of seven detectors, 95 % interval. Small "
         "marks: each detector.",
     )
-    environments = found["environments"]
-    columns = min(2, len(environments))
-    grid = panels(
-        figure,
-        down + 0.22,
-        -(-len(environments) // columns),
-        columns,
-        gap=(0.42, 0.16),
-        sharey=True,
-        sharex=True,
-    )
+    grid = panels(figure, down + 0.22, rows, columns, gap=(0.42, 0.16), sharey=True, sharex=True)
     leave_room(grid, 1.95, 1 - 1.95 / DOUBLE - 0.04)
     for axes, name in zip(grid.ravel(), environments, strict=False):
         for height, (arm, (colour, marker)) in enumerate(_ROWS.items()):
