@@ -115,12 +115,18 @@ class FreeStretches:
         part = np.searchsorted(self._begins, begin, "right") - 1
         first = max(begin - self.gap, self._begins[part])
         last = min(end + self.gap, self._ends[part])
-        # what each stretch has before the event, and what it has behind it
-        low = np.concatenate([self._low, np.maximum(self._low, last)])
-        high = np.concatenate([np.minimum(self._high, first), self._high])
-        is_left = low < high
-        self._low = np.sort(low[is_left])
-        self._high = np.sort(high[is_left])
+        cut = slice(np.searchsorted(self._high, first, "right"), np.searchsorted(self._low, last))
+        low = self._low[cut]
+        high = self._high[cut]
+        left = [(a, first) for a in low[:1] if a < first] + [
+            (last, b) for b in high[-1:] if last < b
+        ]
+        self._low, self._high = (
+            np.concatenate(
+                [edges[: cut.start], [pair[side] for pair in left], edges[cut.stop :]]
+            ).astype(np.int64)
+            for side, edges in enumerate((self._low, self._high))
+        )
         self.num_taken += 1
 
     def draw(self, length: int, rng: np.random.Generator) -> int:
