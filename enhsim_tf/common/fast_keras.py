@@ -8,7 +8,7 @@ reads and writes less memory.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,49 +26,38 @@ from enhsim_tf.common.backend import keras, tf
 # corrected.
 
 
-class AdamStep(NamedTuple):
-    """Scalars of one step of Adam, which are the same for all weights."""
-
-    learning_rate: tf.Tensor
-    beta1_power: tf.Tensor
-    beta2_power: tf.Tensor
-    epsilon: float
-
-
-def adam_step(adam: keras.optimizers.Adam, learning_rate: tf.Tensor | None = None) -> AdamStep:
-    """Computes the scalars of the optimiser's next step, with its own learning rate if none is
-    given.
+def adam_step(
+    adam: keras.optimizers.Adam, learning_rate: tf.Tensor | None = None
+) -> Callable[[tf.Variable, tf.Variable, tf.Variable, tf.Tensor], tf.Operation]:
+    """Returns the optimiser's next step, with its own learning rate if none is given: a function
+    that updates a variable and its two moments by a gradient. It does not advance the optimiser's
+    iteration counter.
     """
+    # the scalars are the same for all variables
     rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
-    step = tf.cast(adam.iterations + 1, tf.float32)
+    number = tf.cast(adam.iterations + 1, tf.float32)
     rate = adam.learning_rate if learning_rate is None else learning_rate
-    powers = tf.pow(adam.beta_1, step), tf.pow(adam.beta_2, step)
-    return AdamStep(tf.cast(rate, tf.float32) * rounding, *powers, adam.epsilon * rounding)
+    rate = tf.cast(rate, tf.float32) * rounding
+    beta1_power = tf.pow(adam.beta_1, number)
+    beta2_power = tf.pow(adam.beta_2, number)
 
+    def update(
+        weight: tf.Variable, momentum: tf.Variable, velocity: tf.Variable, gradient: tf.Tensor
+    ) -> tf.Operation:
+        return tf.raw_ops.ResourceApplyAdam(
+            var=weight.handle,
+            m=momentum.handle,
+            v=velocity.handle,
+            beta1_power=beta1_power,
+            beta2_power=beta2_power,
+            lr=rate,
+            beta1=adam.beta_1,
+            beta2=adam.beta_2,
+            epsilon=adam.epsilon * rounding,
+            grad=gradient,
+        )
 
-def apply_adam(
-    adam: keras.optimizers.Adam,
-    weight: tf.Variable,
-    momentum: tf.Variable,
-    velocity: tf.Variable,
-    gradient: tf.Tensor,
-    step: AdamStep,
-) -> tf.Operation:
-    """Updates a variable and its two moments. It does not advance the optimiser's iteration
-    counter.
-    """
-    return tf.raw_ops.ResourceApplyAdam(
-        var=weight.handle,
-        m=momentum.handle,
-        v=velocity.handle,
-        beta1_power=step.beta1_power,
-        beta2_power=step.beta2_power,
-        lr=step.learning_rate,
-        beta1=adam.beta_1,
-        beta2=adam.beta_2,
-        epsilon=step.epsilon,
-        grad=gradient,
-    )
+    return update
 
 
 def fused_adam(
@@ -86,7 +75,7 @@ def fused_adam(
             getattr(weights, "_value", weights)
             for weights in (variable, adam._momentums[index], adam._velocities[index])
         )
-        apply_adam(adam, *held, gradient, adam_step(adam, learning_rate))
+        adam_step(adam, learning_rate)(*held, gradient)
 
     adam.update_step = update_step
     return adam
@@ -101,7 +90,7 @@ def fused_adam(
 #
 #     the gradient of the layer's inputs  below = upstream @ block^T, with the weights before
 #     the gradient of the block           gradient = inputs[:, rows]^T @ upstream
-#     Adam's update of the block          `apply_adam`
+#     Adam's update of the block          `adam_step`
 #
 # The block and its gradient are still in the processor's cache when the update reads them. Only the
 # order of summation differs.
@@ -153,12 +142,11 @@ class _BlockedDense:
         inputs: tf.Tensor,
         outputs: tf.Tensor,
         upstream: tf.Tensor,
-        adam: keras.optimizers.Adam,
-        step: AdamStep,
+        step: Callable[..., tf.Operation],
         is_first: bool,
     ) -> tf.Tensor | None:
-        """Updates the weights and returns the gradient of the inputs, or None for the first layer,
-        where it is not needed.
+        """Updates the weights by a step of Adam, see `adam_step`, and returns the gradient of the
+        inputs, or None for the first layer, where it is not needed.
         """
         if self.is_relu:
             upstream = tf.where(outputs > 0, upstream, 0.0)
@@ -172,8 +160,8 @@ class _BlockedDense:
                 belows += [] if is_first else [tf.matmul(upstream, block.value, transpose_b=True)]
             # the gradient of the inputs needs the weights before the update
             with tf.control_dependencies(belows[-1:]):
-                before = [apply_adam(adam, *block, gradient, step)]
-        apply_adam(adam, *self.bias, tf.reduce_sum(upstream, axis=0), step)
+                before = [step(*block, gradient)]
+        step(*self.bias, tf.reduce_sum(upstream, axis=0))
         return None if is_first else tf.concat(belows, axis=1)
 
 
@@ -222,9 +210,7 @@ class BlockwiseTraining(keras.Model):
         upstream = tape.gradient(loss, outputs)
         step = adam_step(self.optimizer)
         for number, layer in reversed(list(enumerate(self._stack.layers))):
-            upstream = layer.update(
-                *activations[number : number + 2], upstream, self.optimizer, step, number == 0
-            )
+            upstream = layer.update(*activations[number : number + 2], upstream, step, number == 0)
         self.optimizer.iterations.assign_add(1)
         for metric in self.metrics:
             metric.update_state(loss, sample_weight=tf.shape(inputs)[0])
