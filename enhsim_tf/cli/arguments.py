@@ -88,13 +88,7 @@ def _add_fit(commands: argparse._SubParsersAction) -> None:
         "the report evaluates the simulator on it.",
     )
     _add_source(fit)
-    fit.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="MODEL_DIR",
-        help="output folder, one subfolder for each simulator",
-    )
+    _add_out(fit, "MODEL_DIR", "output folder, one subfolder for each simulator")
     fit.add_argument(
         "--separately",
         action="store_true",
@@ -162,7 +156,7 @@ def _add_generate(commands: argparse._SubParsersAction) -> None:
     )
     _add_repeated(generate, "--channel", "only the simulator of this name")
     out = "a .parquet file (a series may be a .csv file), or a folder for several simulators"
-    generate.add_argument("--out", type=Path, required=True, metavar="OUT", help=out)
+    _add_out(generate, "OUT", out)
     coarse = generate.add_argument_group(
         _OWN, "for models that were fitted with --coarse (docs/own_simulator.md)"
     )
@@ -216,13 +210,7 @@ def _add_score(commands: argparse._SubParsersAction) -> None:
         action="store_true",
         help="draw series, scores and events beside SCORES, as .png",
     )
-    score.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="SCORES",
-        help="a .parquet or .csv file; a folder for several simulators",
-    )
+    _add_out(score, "SCORES", "a .parquet or .csv file; a folder for several simulators")
     _add_json(score)
 
 
@@ -239,12 +227,8 @@ def _add_update(commands: argparse._SubParsersAction) -> None:
     _add_models(update)
     _add_source(update)
     _add_coarse(update.add_argument_group(_OWN, "for simulators that were fitted with --coarse"))
-    update.add_argument(
-        "--out",
-        type=Path,
-        metavar="NEW_DIR",
-        help="folder for the updated simulators (default: MODEL_DIR-updated)",
-    )
+    out = "folder for the updated simulators (default: MODEL_DIR-updated)"
+    _add_out(update, "NEW_DIR", out, required=False)
     update.add_argument(
         "--replace",
         action="store_true",
@@ -275,13 +259,7 @@ def _add_inject(commands: argparse._SubParsersAction) -> None:
         action="store_true",
         help="draw the changed channels, with the anomalies, beside OUT, as .png",
     )
-    inject.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="OUT",
-        help="a .parquet or .csv file; a folder: a file per channel",
-    )
+    _add_out(inject, "OUT", "a .parquet or .csv file; a folder: a file per channel")
     _add_quiet(inject)
     add_options(inject, InjectOptions, "seed")
 
@@ -295,6 +273,10 @@ def _add_repeated(
     parser.add_argument(
         word, action="append", default=default, metavar=metavar, help=f"{text}; may be repeated"
     )
+
+
+def _add_out(parser: AnyParser, metavar: str, text: str, required: bool = True) -> None:
+    parser.add_argument("--out", type=Path, required=required, metavar=metavar, help=text)
 
 
 def _add_models(parser: argparse.ArgumentParser) -> None:

@@ -161,9 +161,7 @@ def channels_by_model(
 
 
 def cleaned_channels(
-    channels: Mapping[str, RawChannel],
-    cleaning: Cleaning,
-    failed: dict[str, Exception] | None = None,
+    channels: Mapping[str, RawChannel], cleaning: Cleaning, failed: dict[str, Exception] | None
 ) -> tuple[list[Telemetry], dict[str, Report]]:
     """Cleans channels, and brings those with enough common time onto one clock; returns a series
     for each such group, and the reports of cleaning. A channel that cannot be used goes into
