@@ -13,21 +13,17 @@ from enhsim_tf.datasets.places import ScenarioRange, draw_between, parse_start
 from enhsim_tf.simulator.changes import fade_length
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.placing import PlacedEvent, in_order, place_events
+from enhsim_tf.telemetry.series import DATES, Clock
 
 
-def series_index(
-    num_samples: int, interval_s: float, start: str | pd.Timestamp | None = None
-) -> pd.Index:
+def series_index(num_samples: int, interval_s: float, start: str | pd.Timestamp | None) -> pd.Index:
     """Returns the index of a generated series: times in UTC named `time`, or, without a start,
     seconds from 0 named `time_s`.
     """
     seconds = np.arange(num_samples) * interval_s
     if start is None:
         return pd.Index(seconds, name="time_s")
-    return pd.DatetimeIndex(
-        parse_start(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"),
-        name="time",
-    )
+    return Clock(interval_s, parse_start(start).value, DATES).index(seconds)
 
 
 def series_labelled(
