@@ -53,15 +53,9 @@ class Paired:
 
     def places_in(self, telemetry: Telemetry) -> list[int]:
         """Returns the first sample of each part among all samples of the telemetry that was cut."""
-        interval_s = telemetry.interval_s
-        begins_s = [part.offset_s for part in telemetry.parts]
-        samples = np.cumsum([0, *map(len, telemetry.parts)])
-        places = []
-        for part in self.telemetry.parts:
-            number = int(np.searchsorted(begins_s, part.offset_s, side="right")) - 1
-            since = round((part.offset_s - begins_s[number]) / interval_s)
-            places.append(int(samples[number]) + since)
-        return places
+        begins_s = np.array([part.offset_s for part in self.telemetry.parts])
+        # half a sample earlier, whatever the rounding
+        return np.searchsorted(telemetry.time_s, begins_s - telemetry.interval_s / 2).tolist()
 
     def split_end(self, share: float) -> tuple["Paired | None", "Paired | None"]:
         """Splits off the end, which has this share of the samples, below 1; None for what has no

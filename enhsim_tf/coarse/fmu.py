@@ -6,9 +6,8 @@ that you trust.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -46,7 +45,7 @@ class FmuSimulator:
     ):
         self.path = Path(path)
         self.columns = check_columns(columns)
-        self.name = Path(path).name
+        self.name = self.path.name
         self.parameters = dict(parameters or {})
         self.commands = commands
         try:
@@ -67,9 +66,9 @@ class FmuSimulator:
         self._variables = {
             variable.name: variable.causality for variable in description.modelVariables
         }
-        self._check_names(self.columns, "output", None)
-        self._check_names(self.parameters, "parameter", "parameter")
-        self._check_names(commands.columns if commands else (), "input", "input")
+        self._check_names(self.columns, "output")  # any variable can be recorded
+        self._check_names(self.parameters, "parameter")
+        self._check_names(commands.columns if commands else (), "input")
 
     def run(
         self,
@@ -87,7 +86,7 @@ class FmuSimulator:
                 "Expected a scenario as a dictionary of parameters. Received: "
                 f"{str(scenario)[:80]!r}. Write {{'name': value}}."
             )
-        self._check_names(scenario or {}, "parameter", "parameter")
+        self._check_names(scenario or {}, "parameter")
         time_s = np.asarray(time_s, np.float64)
         step_s = float(np.mean(np.diff(time_s)))
         inputs = None
@@ -119,16 +118,10 @@ class FmuSimulator:
             )
         return np.stack([output[name][places] for name in self.columns], axis=1).astype(np.float64)
 
-    def _check_names(
-        self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None
-    ) -> None:
+    def _check_names(self, names: Iterable[str], kind: str) -> None:
+        known = [name for name, what in self._variables.items() if kind in ("output", what)]
         for name in names:
-            if name not in self._variables or causality not in (None, self._variables[name]):
-                known = [
-                    variable
-                    for variable, what in self._variables.items()
-                    if causality in (None, what)
-                ]
+            if name not in known:
                 raise InputError(
                     f"Expected the name of a variable ({kind}) of {self.name}: "
                     f"{', '.join(known)[:160]}. Received: {name!r}."

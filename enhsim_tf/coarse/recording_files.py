@@ -38,8 +38,14 @@ _NO_INPUTS = (
 # share of steps that are no whole number of intervals, above which a run is interpolated
 _FEW_ODD = 0.002
 # options of commands that hold for the run, by those of reading telemetry
-_OF_RUNS = {"time": "coarse_time", "columns": "coarse_column", "timezone": "timezone"}
-_OF_RUNS |= {"drop_bad": "drop_bad", "missing_values": "missing_values", "decimal": "decimal"}
+_OF_RUNS = {
+    "time": "coarse_time",
+    "columns": "coarse_column",
+    "timezone": "timezone",
+    "drop_bad": "drop_bad",
+    "missing_values": "missing_values",
+    "decimal": "decimal",
+}
 
 
 def read_recording(

@@ -213,13 +213,14 @@ def fit_box(values: np.ndarray, interval_s: float = 1.0, name: str = "the series
             f"Received: {name}, in which no period was found."
         )
 
+    def explained(trial: float) -> float:
+        return _best_box(index * trial, centred)[0]
+
     # refine the frequency until a step moves the last cycle by less than a thousandth of a period
-    best = max(trials, key=lambda trial: _best_box(index * trial, centred)[0])
+    best = max(trials, key=explained)
     step = 1 / (_OVERSAMPLING * num_samples)
     while step * num_samples > 1e-3:
-        best = max(
-            best + step * np.arange(-4, 5), key=lambda trial: _best_box(index * trial, centred)[0]
-        )
+        best = max(best + step * np.arange(-4, 5), key=explained)
         step /= 3
     _, begin, duty = _best_box(index * best, centred)
     inside = np.mod(index * best - begin, 1.0) < duty
