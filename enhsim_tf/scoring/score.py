@@ -140,7 +140,7 @@ def score(
             "them, or cut the telemetry there: `read_telemetry` does both."
         )
     paired = simulator.pair(telemetry, run)
-    channels = [simulator.channels[number] for number in simulator.places_of(telemetry.columns)]
+    channels = paired.telemetry.columns
     scorer = scorer_of(simulator, options, channels)
     values = telemetry.values
     scores = np.full(len(values), np.nan)

@@ -117,7 +117,8 @@ class EnhancedSimulator:
         """Cuts telemetry to what can be judged, and the coarse run of the same time with it.
 
         Args:
-            telemetry: Telemetry of the channels, or of some of them.
+            telemetry: Telemetry of the channels, or of some of them. A single channel may have any
+                name; what is returned has that of the simulator.
             run: The coarse run, for a simulator of recorded runs.
 
         Raises:
@@ -125,8 +126,9 @@ class EnhancedSimulator:
                 is shorter than a window.
         """
         names = telemetry.columns
-        is_known = set(names) <= set(self.channels)
-        if not is_known and not len(names) == len(self.channels) == 1:
+        if len(names) == len(self.channels) == 1:
+            telemetry = dataclasses.replace(telemetry, columns=self.channels)
+        elif not set(names) <= set(self.channels):
             raise InputError(
                 f"Expected the channels {', '.join(self.channels)[:120]}. Received: "
                 f"{', '.join(names)[:120]}. Select them with --column."
@@ -150,7 +152,7 @@ class EnhancedSimulator:
         and the coarse and the enhanced signal of the same times; raises InputError if a channel is
         missing.
         """
-        paired = dataclasses.replace(paired, telemetry=self.named(paired.telemetry))
+        paired = dataclasses.replace(paired, telemetry=paired.telemetry.select(self.channels))
         starts = evenly_spaced_starts(paired.telemetry.parts, self.window, number)
         windows = windows_of(paired.telemetry, starts, self.window)
         return windows, *self.alignment.signals(self.enhancer, windows, paired, starts)
@@ -163,12 +165,6 @@ class EnhancedSimulator:
             return dataclasses.replace(telemetry, columns=self.channels)
         return telemetry.select(self.channels)
 
-    def places_of(self, names: Sequence[str]) -> list[int]:
-        """Returns the numbers of channels of telemetry; a single channel may have any name."""
-        if len(self.channels) == 1:
-            return [0]
-        return [self.channels.index(name) for name in names]
-
     def judged_series(self, paired: Paired) -> list[np.ndarray]:
         """Returns what is judged of each part, shape `(samples, channels)`: the telemetry, or for
         recorded runs its difference from the enhanced run of the same time.
@@ -178,7 +174,7 @@ class EnhancedSimulator:
 
     def explained_series(self, paired: Paired) -> list[np.ndarray]:
         """Returns the enhanced run at each part, shape `(samples, channels)`; 0 without one."""
-        places = self.places_of(paired.telemetry.columns)
+        places = [self.channels.index(name) for name in paired.telemetry.columns]
         explained = self.alignment.explained(self.enhancer, paired)
         return [known[:, places] for known in explained]
 
