@@ -57,18 +57,18 @@ def score_figure(scored: ScoredTelemetry, name: str) -> matplotlib.figure.Figure
         sheet.curve(axes, frame[scored.columns[channel]], REAL, 0.6)
         if channel in scored.enhanced:
             sheet.curve(axes, frame[scored.enhanced[channel]], ENHANCED, 1.0)
-            title_words(
-                axes,
-                [("telemetry", REAL), ("enhanced run", ENHANCED)] if axes is sheet.axes[0] else [],
-            )
+    if scored.enhanced:
+        title_words(sheet.axes[0], [("telemetry", REAL), ("enhanced run", ENHANCED)])
     sheet.curve(last, frame["score"], REAL, 0.7)
     last.axhline(1, color=QUIET, linewidth=0.8, linestyle=DASHED)
     if np.nanmax(frame["score"].to_numpy(), initial=0.0) > 20:
         last.set_yscale("log")
     for axes in sheet.axes:
-        words = [", ".join(event.views) if axes is last else "" for event in scored.events]
-        spans = [(event.begin, event.end) for event in scored.events]
-        sheet.shade(axes, [(*span, word) for span, word in zip(spans, words, strict=True)])
+        spans = [
+            (event.begin, event.end, ", ".join(event.views) if axes is last else "")
+            for event in scored.events
+        ]
+        sheet.shade(axes, spans)
     return sheet.figure
 
 
@@ -142,8 +142,10 @@ class Sheet:
             after = self.times[end - 1] + self.step
             axes.axvspan(first, after, color=GENERATED, alpha=0.3, linewidth=0.5)
             width = 0.012 + 0.0085 * len(word)  # of text of 7 points, in widths of the panel
-            is_last = (first - low) / (high - low) + width > 1
-            left = (after - low) / (high - low) - width if is_last else (first - low) / (high - low)
+            left = (first - low) / (high - low)
+            is_last = left + width > 1
+            if is_last:
+                left = (after - low) / (high - low) - width
             line = next((line for line, until in enumerate(taken) if until <= left), None)
             if line is not None:
                 taken[line] = left + width
