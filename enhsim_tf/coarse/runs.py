@@ -91,8 +91,8 @@ class Runs:
         return [enhancer.enhance_run(part.values) for part in paired.run.parts]
 
     def state(self) -> dict[str, dict[str, float]]:
-        """Returns nothing: a run has no level, gain or period of its own."""
-        return {}
+        """Returns nothing of any channel: a run has no level, gain or period of its own."""
+        return {"level": {}, "gain": {}, "period_s": {}}
 
     # generation
 
@@ -125,7 +125,7 @@ class Runs:
         enhancer: Enhances,
         num_samples: int,
         seed: int,
-        events: Sequence[tuple[Any, int, int]] = (),
+        events: Sequence[tuple[Any, int, int]],
     ) -> CleanSeries:
         """Returns the enhanced nominal run, repeated if the series is longer; parts and repetitions
         are cross-faded.

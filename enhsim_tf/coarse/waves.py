@@ -141,10 +141,9 @@ class Waves:
         """Whether windows are too flat for the wave of a channel; `gain` is that of `align`, of
         shape `(windows, channels)` as the result.
         """
-        scales = [level_offset_and_scale(wave)[1] for wave in self.simulators]
         return gain < [
-            0.0 if wave.is_constant else MIN_GAIN * scale
-            for wave, scale in zip(self.simulators, scales, strict=True)
+            0.0 if wave.is_constant else MIN_GAIN * level_offset_and_scale(wave)[1]
+            for wave in self.simulators
         ]
 
     # telemetry
@@ -197,16 +196,15 @@ class Waves:
         periodic.
         """
         level, gain = np.median(self.levels, axis=0).T.tolist()
-        periods = {
-            channel: float(wave.period_s)
-            for channel, wave in zip(self.channels, self.simulators, strict=True)
-            if not wave.is_constant
-        }
-        by_channel = {"level": level, "gain": gain}
         return {
-            name: dict(zip(self.channels, values, strict=True))
-            for name, values in by_channel.items()
-        } | {"period_s": periods}
+            "level": dict(zip(self.channels, level, strict=True)),
+            "gain": dict(zip(self.channels, gain, strict=True)),
+            "period_s": {
+                channel: float(wave.period_s)
+                for channel, wave in zip(self.channels, self.simulators, strict=True)
+                if not wave.is_constant
+            },
+        }
 
     # generation
 
@@ -260,7 +258,7 @@ class Waves:
         enhancer: Enhances,
         num_samples: int,
         seed: int,
-        events: Sequence[tuple[Degraded, int, int]] = (),
+        events: Sequence[tuple[Degraded, int, int]],
     ) -> CleanSeries:
         """Enhances a coarse series in windows that overlap by half, and cross-fades them.
 

@@ -11,7 +11,6 @@ from threadpoolctl import threadpool_limits
 from enhsim_tf.coarse.interface import CoarseSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.fitting.fitted import Fitted
 from enhsim_tf.fitting.of_runs import fit_runs
 from enhsim_tf.fitting.of_waves import fit_waves
 from enhsim_tf.fitting.options import FitOptions
@@ -64,14 +63,8 @@ def fit(
         fitted = fit_waves(recording, options, progress)
     else:
         fitted = fit_runs(recording, coarse, options, progress)
-    return _finished(fitted, progress)
-
-
-def _finished(fitted: Fitted, progress: Progress) -> tuple[EnhancedSimulator, Report]:
-    """Fits the noise model, and measures the simulator."""
-    options = fitted.options
-    name = options.noise or fitted.noise_name
     progress.step("noise")
+    name = options.noise or fitted.noise_name
     noise = noise_model(name).fit(fitted.noise, fitted.clean)
     progress.step("report")
     trained = {

@@ -1,6 +1,5 @@
 """Fits the enhancer to a recorded run of the user's simulator and telemetry of the same time."""
 
-import dataclasses
 import itertools
 
 import numpy as np
@@ -17,8 +16,8 @@ from enhsim_tf.fitting.coarse_choice import too_short
 from enhsim_tf.fitting.fitted import Fitted, num_training_windows
 from enhsim_tf.fitting.options import LEAST_LEARNT, FitOptions, default_window
 from enhsim_tf.noise.registry import RESIDUAL_WINDOWS
-from enhsim_tf.telemetry.series import Part, Telemetry
-from enhsim_tf.telemetry.windows import evenly_spaced_starts, times_of, windows_of
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import cut, evenly_spaced_starts, times_of, windows_of
 
 
 def fit_runs(
@@ -66,9 +65,9 @@ def fit_runs(
         inputs, targets, times, options.enhancer, options.seed, options.epochs, progress
     )
     residuals = _held_out_residuals(learnt, choice, inputs, targets, times, options)
-    places = evenly_spaced_starts(residuals.parts, window, number)
-    noise, clean = np.split(windows_of(residuals, places, window), 2, axis=2)
-    unlearnt = [part.values[:, : len(recording.columns)] for part in residuals.parts]
+    places = evenly_spaced_starts(residuals, window, number)
+    noise, clean = np.split(cut(residuals, places, window), 2, axis=2)
+    unlearnt = [stretch[:, : len(recording.columns)] for stretch in residuals]
     alignment = Runs(learnt.run, recording.columns, window, delay.seconds)
     late = []
     if held_out is not None:
@@ -157,9 +156,10 @@ def _held_out_residuals(
     targets: np.ndarray,
     times: np.ndarray,
     options: FitOptions,
-) -> Telemetry:
+) -> list[np.ndarray]:
     """Returns residual and enhanced run of all blocks of time, side by side, each from an enhancer
-    that was not fitted to that block.
+    that was not fitted to that block: stretches of shape `(samples, 2 * channels)`, in the order of
+    time.
 
     Residuals of the telemetry that an enhancer has learnt from are too small, because it has learnt
     part of their noise.
@@ -181,15 +181,12 @@ def _held_out_residuals(
                 if high - low >= window:
                     clean = enhancer.enhance_run(coarse.values[low:high])
                     both = np.concatenate([part.values[low:high] - clean, clean], axis=1)
-                    stretches.append(Part(both, (first + low) * telemetry.interval_s))
+                    stretches.append((first + low, both))
     if not stretches:
         raise InputError(
             f"Expected stretches of at least a window of {window} samples without a gap. Received: "
             f"none in any of {len(choice.edges) - 1} blocks of time. Give longer runs or a smaller "
             "--window."
         )
-    columns = tuple(
-        f"{what} of {name}" for what in ("residual", "enhanced run") for name in telemetry.columns
-    )
-    stretches.sort(key=lambda stretch: stretch.offset_s)
-    return dataclasses.replace(telemetry, parts=tuple(stretches), columns=columns)
+    stretches.sort(key=lambda stretch: stretch[0])
+    return [both for _, both in stretches]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.coarse.alignment import Paired
 from enhsim_tf.common.errors import MANY, printable, spoken
 from enhsim_tf.common.measures import nrmse_of_channels
 from enhsim_tf.enhancer.candidates import Judged
@@ -200,6 +199,9 @@ def make_report(simulator: EnhancedSimulator, fitted: Fitted, noise: str) -> Rep
         nrmse_of_channels(clean, real).tolist(),
         strict=True,
     )
+    outside = None
+    if judged.run is not None:
+        outside = float((TrustedRange(simulator).score_parts(judged.run) > 1).mean())
     errors_of_windows = np.mean((left / simulator.scale) ** 2, axis=(1, 2))
     shown = int(np.argsort(errors_of_windows)[len(left) // 2])
     return Report(
@@ -217,7 +219,7 @@ def make_report(simulator: EnhancedSimulator, fitted: Fitted, noise: str) -> Rep
         false_alarms=false_alarms,
         set_for=scorer.rate,
         views=views,
-        outside=_share_outside(simulator, judged),
+        outside=outside,
         examples={
             "coarse": plain[shown],
             "enhanced": clean[shown],
@@ -225,13 +227,6 @@ def make_report(simulator: EnhancedSimulator, fitted: Fitted, noise: str) -> Rep
             "generated": simulator.generate(1, seed=seed)[0],
         },
     )
-
-
-def _share_outside(simulator: EnhancedSimulator, judged: Paired) -> float | None:
-    """The share of a run outside the training range of its columns; None if there is no run."""
-    if judged.run is None:
-        return None
-    return float((TrustedRange(simulator).score_parts(judged.run) > 1).mean())
 
 
 def correlation_of(windows: np.ndarray) -> np.ndarray:

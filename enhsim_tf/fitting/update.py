@@ -30,9 +30,9 @@ class State:
     nrmse: dict[str, float]
     noise_sd: dict[str, float]
     alarms: float  # share of samples above the threshold
-    level: dict[str, float] = dataclasses.field(default_factory=dict)
-    gain: dict[str, float] = dataclasses.field(default_factory=dict)
-    period_s: dict[str, float] = dataclasses.field(default_factory=dict)
+    level: dict[str, float]
+    gain: dict[str, float]
+    period_s: dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True)
