@@ -44,7 +44,7 @@ def choose_coarse(
     Args:
         telemetry: Nominal telemetry of the channel.
         window: Length of a window in samples. None: chosen, short enough that the record has eight
-            windows.
+            windows and that parts with half of its samples have one.
         refused: Why square waves are not to be used; None if they may be.
 
     Raises:
@@ -53,13 +53,15 @@ def choose_coarse(
     (name,) = telemetry.columns
     parts = telemetry.parts
     longest = max(telemetry.pieces(), key=len)
+    usual = usual_length(parts)
     values = telemetry.values[:, 0].astype(np.float64)
     if len(values) < LEAST_SAMPLES:
         raise too_short(FEWEST_SAMPLES, name, parts)
     coarse, about_wave = (None, refused) if refused else _square_wave(longest)
     if coarse is not None:
         period = coarse.period_s / telemetry.interval_s
-        wanted = window or int(np.clip(round(2 * period), LEAST_WINDOW, MOST_WINDOW))  # two periods
+        two_periods = min(round(2 * period), usual)
+        wanted = window or int(np.clip(two_periods, LEAST_WINDOW, MOST_WINDOW))
         # a window shorter than half a period shows no edge of the wave most of the time
         least = wanted if window else max(FEWEST_SAMPLES, min(wanted, int(np.ceil(period / 2))))
         fitting = longest_window(parts, wanted, least, LEAST_LEARNT)
@@ -69,7 +71,7 @@ def choose_coarse(
             f"{LEAST_LEARNT} windows of half the period of its best square wave, {period:.0f} "
             f"samples, do not fit into {len(values):,} samples"
         )
-    wanted = window or default_window(len(values))
+    wanted = window or max(FEWEST_SAMPLES, min(default_window(len(values)), usual))
     fitting = longest_window(parts, wanted, wanted if window else FEWEST_SAMPLES, LEAST_LEARNT)
     if not fitting:
         raise too_short(window or FEWEST_SAMPLES, name, parts)
@@ -84,15 +86,33 @@ def choose_coarse(
     return CoarseChoice(fitting, said, level)
 
 
+def usual_length(parts: Sequence[Sized]) -> int:
+    """Returns the length that parts with half of all samples have at least."""
+    lengths = np.sort([len(part) for part in parts])[::-1]
+    return int(lengths[np.searchsorted(np.cumsum(lengths), lengths.sum() / 2)])
+
+
+def on_short_parts(telemetry: Telemetry, window: int) -> list[str]:
+    """Returns what is to be reported about parts that are shorter than a window."""
+    lengths = [len(part) for part in telemetry.parts]
+    short = [length for length in lengths if length < window]
+    if not short:
+        return []
+    return [
+        f"{len(short):,} of {len(lengths):,} parts are shorter than a window of {window:,} samples "
+        f"and not used, {sum(short):,} of {sum(lengths):,} samples; a smaller --window uses more"
+    ]
+
+
 def too_short(window: int, name: str, parts: Sequence[Sized]) -> InputError:
     """Makes the error about parts that do not have enough windows to learn from."""
     lengths = [len(part) for part in parts]
     least = LEAST_LEARNT * window
+    smaller = ", or a smaller --window or --held-out" if window > FEWEST_SAMPLES else ""
     return InputError(
         f"Expected at least {least:,} samples to learn from, {LEAST_LEARNT} windows of {window}. "
         f"Received: {sum(lengths):,} samples of {name} that are "
-        f"not held out, the longest part {max(lengths, default=0):,}. Give more telemetry, or a "
-        "smaller --window or --held-out."
+        f"not held out, the longest part {max(lengths, default=0):,}. Give more telemetry{smaller}."
     )
 
 

@@ -13,7 +13,13 @@ from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import MANY, spoken
 from enhsim_tf.enhancer.candidates import Choice, Training, choose_enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
-from enhsim_tf.fitting.coarse_choice import LEAST_SAMPLES, CoarseChoice, choose_coarse, too_short
+from enhsim_tf.fitting.coarse_choice import (
+    LEAST_SAMPLES,
+    CoarseChoice,
+    choose_coarse,
+    on_short_parts,
+    too_short,
+)
 from enhsim_tf.fitting.fitted import Fitted, num_training_windows
 from enhsim_tf.fitting.options import LEAST_LEARNT, FitOptions
 from enhsim_tf.noise.registry import MATCHED
@@ -78,7 +84,7 @@ def fit_waves(recording: Telemetry, options: FitOptions, progress: Progress) -> 
         nominal_series=[part.values for part in recording.parts],
         options=options,
         coarse=" ".join([*reasons, note]).strip(),
-        notes=[slow] if window < longest else [],
+        notes=[*on_short_parts(recording, window), *([slow] if window < longest else [])],
     )
 
 

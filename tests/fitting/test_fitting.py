@@ -41,6 +41,18 @@ def test_each_channel_keeps_its_phase_level_and_scale(both):
 
 
 @pytest.mark.parametrize("coarse", [None, coarse_run()])
+def test_parts_with_half_of_the_samples_have_a_window_and_shorter_ones_are_reported(coarse):
+    whole = series()
+    # 1,800 of 2,880 samples are in parts of 60
+    parts = [whole.part(first, first + 60) for first in range(0, 2_040, 68)]
+    parts += [whole.part(2_040, 2_980), whole.part(2_985, 3_000)]
+    options = dataclasses.replace(QUICK, window=None)
+    simulator, report = fit(parts, coarse, options)
+    assert simulator.window <= 60
+    assert any("1 of 32 parts" in note and "15 of 2,755" in note for note in report.notes)
+
+
+@pytest.mark.parametrize("coarse", [None, coarse_run()])
 def test_nominal_telemetry_keeps_a_piece_that_only_the_split_makes_shorter_than_a_window(coarse):
     whole = series()
     # 2,400 samples are not held out
