@@ -132,7 +132,7 @@ def fit_or_say(group: Group, out: Path, options: argparse.Namespace) -> Outcome:
     from enhsim_tf.fitting.fit import fit
 
     outcome = Outcome(_name(group))
-    speaks = options.engine == "local" and not options.json
+    speaks = options.engine == "local" and not options.json and not options.quiet
     with failing(group, outcome.failed):
         groups, cleaned = cleaned_channels(group, options.cleaning, outcome.failed)
         outcome.lines += lines_of(list(cleaned.values()))

@@ -25,18 +25,21 @@ def table(**more):
     return {name: pd.Series(each, times, name=name) for name, each in columns.items()}
 
 
+def options_of(tmp_path, **more):
+    given = {
+        "out": tmp_path / "models",
+        "chosen": OPTIONS,
+        "cleaning": Cleaning(),
+        "engine": "local",
+        "json": True,
+        "coarse": None,
+    }
+    return argparse.Namespace(**given | more)
+
+
 def fitted(tmp_path, columns, separately=False, workers=None):
     lines = []
-    options = argparse.Namespace(
-        out=tmp_path / "models",
-        separately=separately,
-        workers=workers,
-        chosen=OPTIONS,
-        cleaning=Cleaning(),
-        engine="local",
-        json=True,
-        coarse=None,
-    )
+    options = options_of(tmp_path, separately=separately, workers=workers)
     return (*fit.fit_channels(columns, options, lines.append), lines)
 
 
@@ -59,6 +62,15 @@ def test_separate_simulators_have_the_same_bytes_in_this_process_and_in_another(
         assert sum("in place of the one that was there" in line for line in lines) == 2 * workers
         sums.append([sha256(models / name / "arrays.npz") for name in ("volts", "watts")])
     assert sums[0] == sums[1]
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_a_worker_tells_its_progress_unless_it_is_to_be_quiet(tmp_path, capsys, quiet):
+    options = options_of(tmp_path, json=False, quiet=quiet)
+    (tmp_path / "models").mkdir()
+    group = {"volts": table()["volts"]}
+    fit.fit_or_say(group, tmp_path / "models", options)
+    assert bool(capsys.readouterr().out) != quiet
 
 
 def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
