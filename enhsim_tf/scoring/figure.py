@@ -46,7 +46,9 @@ def score_figure(scored: ScoredTelemetry, name: str) -> matplotlib.figure.Figure
     title = (
         f"{drawable(name, 30)}: {counted(number, 'event')}, {share:.1%} of scored samples flagged"
     )
-    subtitle = "Shaded: events, with what raised them. Dashed: threshold."
+    subtitle = (
+        "Shaded: events, with what raised them. Flagged: scores that rise above the dashed line."
+    )
     if len(channels) < len(scored.columns):
         subtitle += (
             f" Drawn: the {len(channels)} of {len(scored.columns)} channels that depart most."

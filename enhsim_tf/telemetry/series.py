@@ -175,7 +175,10 @@ class Telemetry:
         names = check_columns(self.columns)
         shapes = [part.values.shape for part in self.parts]
         if not shapes or any(shape[1:] != (len(names),) for shape in shapes):
-            raise InputError(f"Expected parts of {len(names)} channels. Received: {shapes}.")
+            raise InputError(
+                f"Expected parts of {len(names)} channels. Received: {shapes}. Give each channel a "
+                "name."
+            )
         object.__setattr__(self, "columns", names)
         object.__setattr__(self, "name", ", ".join(names) if self.name is None else self.name)
 
