@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse.pairing import estimate_delay, pair_recordings
-from enhsim_tf.telemetry.joining import join_channels
-from enhsim_tf.telemetry.series import Clock, Part, Telemetry
-from tests.known_simulators import parts_of
-
-START = "2024-01-01T00:00:00+00:00"
+from enhsim_tf.telemetry.joining import one_series
+from enhsim_tf.telemetry.series import Clock, Part
+from tests.fitted_simulators import recorded
 
 
 def drive(num_samples=2_000, seed=0):
@@ -26,21 +24,14 @@ def pair_of(values, delay, others=(), noise=0.3):
     """A recording of the values, and telemetry that follows it `delay` samples later."""
     rng = np.random.default_rng(1)
     telemetry = np.roll(values, delay) + noise * values.std() * rng.standard_normal(len(values))
-    columns = np.stack([*others, values], axis=1).astype(np.float32)
-    names = [f"c{number}" for number in range(columns.shape[1])]
-    recording = parts_of((Part(columns),), names, 10.0, START)
-    return Telemetry.of(telemetry.astype(np.float32), 10.0, 0.0, START, "volts"), recording
+    columns = [*others, values]
+    names = [f"c{number}" for number in range(len(columns))]
+    return recorded(telemetry), recorded(np.stack(columns, axis=1), names)
 
 
 def from_start(recording, start):
     """A recording whose clock begins at another time."""
     return dataclasses.replace(recording, clock=Clock.of(recording.interval_s, start))
-
-
-def recorded(parts):
-    """Parts of telemetry as a recording."""
-    (found,) = join_channels({"volts": parts})
-    return found
 
 
 @pytest.mark.parametrize("delay", [0, 1, -64])
@@ -57,7 +48,7 @@ def test_a_delay_is_recovered_across_gaps_and_a_negative_correlation():
     recording = dataclasses.replace(
         recording, parts=(Part(values[:900]), Part(values[950:], 9_500.0))
     )
-    found = estimate_delay(recorded(parts), recording, 64)
+    found = estimate_delay(one_series(parts), recording, 64)
     coarse = recording.at(10.0 * np.arange(2_000) - 70.0)[:, 0]
     there = np.isfinite(coarse)
     there[700:760] = there[1_500:1_530] = False
@@ -74,19 +65,16 @@ def test_a_delay_longer_than_a_window_is_refused_with_the_delay_to_give(refused)
     telemetry, recording = pair_of(drive(), 200)
     with refused("at most a window, 64 samples", "--delay 2000"):
         estimate_delay(telemetry, recording, 64)
-    found, run = pair_recordings(recorded([telemetry]), recording, 2_000.0)
+    found, run = pair_recordings(telemetry, recording, 2_000.0)
     assert found.parts[0].offset_s == 2_000
     assert np.corrcoef(found.values[:, 0], run.values[:, 0])[0, 1] > 0.9
 
 
 def test_both_are_cut_to_the_time_they_share():
     telemetry, recording = pair_of(drive(), 0, noise=0)
-    recording = dataclasses.replace(
-        from_start(recording, "2024-01-01T00:10:00+00:00"),
-        parts=(Part(recording.values[60:1_000]),),
-    )
+    late = recorded(recording.values[60:1_000], ["c0"], "2024-01-01T00:10:00+00:00")
     parts = [telemetry.part(0, 500), telemetry.part(520, 2_000)]
-    found, run = pair_recordings(recorded(parts), recording)
+    found, run = pair_recordings(one_series(parts), late)
     assert [(part.offset_s, len(part)) for part in found.parts] == [(600.0, 440), (5_200.0, 480)]
     assert [part.offset_s for part in run.parts] == [600.0, 5_200.0]
     np.testing.assert_allclose(found.values, run.values, atol=1e-5)
@@ -106,4 +94,4 @@ def test_runs_of_another_time_are_refused(refused):
         (["at least 3000 samples"], recording, 3_000),
     ):
         with refused(*words):
-            pair_recordings(recorded([telemetry]), run, least_samples=least_samples)
+            pair_recordings(telemetry, run, least_samples=least_samples)

@@ -8,7 +8,7 @@ import pytest
 
 from enhsim_tf.coarse.pairing import pair_recordings
 from enhsim_tf.coarse.recording_files import read_recording
-from enhsim_tf.telemetry.series import Part
+from enhsim_tf.telemetry.series import Part, Telemetry
 from tests.known_simulators import parts_of
 
 
@@ -184,9 +184,7 @@ def test_the_zero_of_a_run_can_be_given(written, refused):
     path = written(stepped(EVEN))
     found = read_recording(path, start="2024-03-01T02:00:00+01:00")
     assert found.start == "2024-03-01T01:00:00+00:00"
-    telemetry = parts_of(
-        (Part(np.zeros((50, 1), np.float32), 4.0),), ("celsius",), 2.0, "2024-03-01T01:00:00+00:00"
-    )
+    telemetry = Telemetry.of(np.zeros(50, np.float32), 2.0, 4.0, "2024-03-01T01:00")
     _, paired = pair_recordings(telemetry, found)
     np.testing.assert_allclose(paired.values[:, 0], 6.0 + 3.0 * np.arange(50))
     with refused("--coarse-start 2024-03-01T01:00:04"):

@@ -14,6 +14,7 @@ from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.placing import FreeStretches, PlacedEvent
 from enhsim_tf.telemetry.series import Part, Telemetry
+from tests.fitted_simulators import recorded
 from tests.known_simulators import parts_of
 
 
@@ -177,7 +178,7 @@ CONSTANT = Telemetry.of(np.ones(900, np.float32))
         (PARTS, {"kinds": ["ramp"], "length": ("20min", "50")}, "20min:50"),
         (Telemetry.of(WITHOUT_NOISE), {"kinds": ["ramp"]}, "--noise-sd"),
         (
-            parts_of([Part(np.outer(WITHOUT_NOISE, [3, -2]).astype(np.float32))], ("a", "b")),
+            recorded(np.outer(WITHOUT_NOISE, [3, -2]), ("a", "b")),
             {"kinds": ["delay", "ramp"]},
             "--noise-sd",
         ),
@@ -262,16 +263,14 @@ def test_a_common_shift_has_the_severity_in_each_channel():
 
 
 def test_a_joint_anomaly_that_changes_nothing_is_drawn_again():
-    values = NOMINAL[:, :2].copy()
-    values[:, 1] = 7  # a constant channel that is late is as before
-    given = parts_of((Part(values),), ("a", "b"), name="ab")
-    injected = inject(given, InjectOptions(["delay"], length=("20", "20"), number=6))
+    values = NOMINAL[:, :2] * (1, 0)  # a constant channel that is late is as before
+    options = InjectOptions(["delay"], length=("20", "20"), number=6)
+    injected = inject(recorded(values, ("a", "b")), options)
     assert {anomaly.channel for anomaly in injected.anomalies} == {"a"}
 
 
 def test_anomalies_of_one_of_several_channels_are_put_into_one_that_has_noise():
     noise = 0.2 * np.random.default_rng(0).standard_normal(900)
-    values = np.stack([np.full(900, 5.0), noise], axis=1).astype(np.float32)
-    given = parts_of((Part(values),), ("level", "volts"))
+    given = recorded(np.stack([np.full(900, 5.0), noise], axis=1), ("level", "volts"))
     injected = inject(given, InjectOptions(["ramp"], length=("20", "20"), number=5))
     assert [anomaly.channel for anomaly in injected.anomalies] == ["volts"] * 5

@@ -8,9 +8,17 @@ from enhsim_tf.fitting.fit import fit
 from enhsim_tf.fitting.options import FitOptions
 from enhsim_tf.scoring.score import scorer_of
 from enhsim_tf.scoring.scorer import MOST_NOMINAL, bounded
-from enhsim_tf.telemetry.series import Part, Telemetry
-from tests.fitted_simulators import PERIOD, QUICK, WINDOW, coarse_run, joint, series, smooth_wave
-from tests.known_simulators import parts_of
+from enhsim_tf.telemetry.series import Telemetry
+from tests.fitted_simulators import (
+    PERIOD,
+    QUICK,
+    WINDOW,
+    coarse_run,
+    joint,
+    recorded,
+    series,
+    smooth_wave,
+)
 
 
 def test_the_waveform_below_the_noise_is_recovered(single):
@@ -64,9 +72,8 @@ def test_nominal_telemetry_keeps_a_piece_that_only_the_split_makes_shorter_than_
 
 
 def test_a_delay_between_run_and_telemetry_is_recovered():
-    late = series()
-    # the same values, seven samples later
-    late = Telemetry.of(late.values, late.interval_s, 70.0, late.start, late.name)
+    # seven samples later
+    late = recorded(series().values, start="2024-01-01T00:01:10+00:00")
     simulator, report = fit(late, coarse_run(4_000), QUICK)
     assert simulator.alignment.delay_s == 70.0 and any(
         "later than the coarse run" in note for note in report.notes
@@ -78,27 +85,21 @@ def test_only_channels_that_follow_no_wave_become_levels():
     # its best square wave is as high as the spike, and all other windows are flat beside it
     values[2_000] += 1e5
     noise = np.random.default_rng(1).standard_normal(3_000).astype(np.float32)
-    others = {
-        name: Telemetry.of(channel, 10.0, 0.0, series().start, name)
-        for name, channel in (("spiky", values), ("noise", noise))
-    }
-    simulator, _ = fit({"volts": series(seed=1), **others}, options=QUICK)
+    channels = np.column_stack([series(seed=1).values, values, noise])
+    simulator, _ = fit(recorded(channels, ("volts", "spiky", "noise")), options=QUICK)
     assert [each.is_constant for each in simulator.alignment.simulators] == [False, True, True]
     assert np.std(simulator.generate(200), axis=(0, 1))[2] == pytest.approx(1.0, rel=0.05)
 
 
 def test_a_channel_that_begins_still_is_named():
-    values = np.concatenate([joint().values, np.zeros((3_000, 1))], axis=1).astype(np.float32)
-    values[2_700:, 2] = 1
-    whole = dataclasses.replace(joint(), parts=(Part(values),), columns=("volts", "watts", "valve"))
+    valve = np.arange(3_000) >= 2_700
+    whole = recorded(np.column_stack([joint().values, valve]), ("volts", "watts", "valve"))
     assert "the first 80% of valve is constant" in fit(whole, options=QUICK)[1].coarse
 
 
 def test_quantised_channels_stay_on_their_levels():
-    telemetry = series(noise_sd=0.3)
-    values = np.round(telemetry.values / 0.5).astype(np.float32) * 0.5
-    rounded = Telemetry.of(values, 10.0, 0.0, telemetry.start, "volts")
-    simulator, _ = fit(rounded, options=QUICK)
+    rounded = np.round(series(noise_sd=0.3).values / 0.5) * 0.5
+    simulator, _ = fit(recorded(rounded), options=QUICK)
     values = simulator.generate(50) / 0.5
     np.testing.assert_allclose(values, np.round(values), atol=1e-4)
 
@@ -186,11 +187,9 @@ def test_an_option_out_of_range_is_refused_by_its_name(wrong):
 
 def test_differences_from_a_run_that_scores_are_learnt_from_are_of_enhancers_that_have_not_learnt_them():
     """Ridge regression on few windows learns part of their noise, so what it leaves is too small."""
-    noise = np.random.default_rng(3).standard_normal((1_500, 2)).astype(np.float32)
-    run = parts_of((Part(noise[:, :1]),), ("watts",), 10.0, series().start, "the run")
-    telemetry = Telemetry.of(noise[:, 1], 10.0, 0.0, series().start, "volts")
+    noise = np.random.default_rng(3).standard_normal((1_500, 2))
     options = dataclasses.replace(QUICK, num_windows=60, delay_s=0.0)
-    simulator, _ = fit(telemetry, run, options)
+    simulator, _ = fit(recorded(noise[:, 1]), recorded(noise[:, 0], "watts"), options)
     unlearnt = np.concatenate(simulator.nominal)
     learnt = noise[:1_200, 1:] - simulator.enhance_run(noise[:1_200, :1])
     assert np.std(unlearnt) > 1 > np.std(learnt)
@@ -200,8 +199,7 @@ def test_differences_from_a_run_that_scores_are_learnt_from_are_of_enhancers_tha
     ("values", "by"), [(np.full(1_500, 3.5), 0.01), (np.arange(1_500) // 700 % 2, 3.0)]
 )
 def test_a_channel_that_never_or_hardly_varies_is_fitted_and_other_values_are_flagged(values, by):
-    telemetry = Telemetry.of(values.astype(np.float32), 1.0, name="valve")
-    simulator, report = fit(telemetry)
+    simulator, report = fit(Telemetry.of(values.astype(np.float32)))
     assert report.false_alarms <= 0.1 and np.isfinite(simulator.generate(5)).all()
     new = values[:600].astype(np.float32)
     new[300:310] += by
@@ -210,9 +208,8 @@ def test_a_channel_that_never_or_hardly_varies_is_fitted_and_other_values_are_fl
 
 
 def test_a_constant_channel_beside_others_changes_none_of_them():
-    values = np.concatenate([joint().parts[0].values, np.full((3_000, 1), 7, np.float32)], axis=1)
-    whole = dataclasses.replace(joint(), parts=(Part(values),), columns=("volts", "watts", "valve"))
-    simulator, report = fit(whole, options=QUICK)
+    values = np.column_stack([joint().values, np.full(3_000, 7)])
+    simulator, report = fit(recorded(values, ("volts", "watts", "valve")), options=QUICK)
     assert "valve: coarse simulator: none" in report.coarse and "never varies" in report.coarse
     generated = simulator.generate(20, seed=1)
     np.testing.assert_array_equal(generated[:, :, 2], 7)

@@ -7,9 +7,8 @@ from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.fitting.fit import fit
 from enhsim_tf.fitting.update import update
-from enhsim_tf.telemetry.joining import join_channels
-from enhsim_tf.telemetry.series import Part, Telemetry
-from tests.fitted_simulators import QUICK, coarse_run, joint, series
+from enhsim_tf.telemetry.joining import one_series
+from tests.fitted_simulators import QUICK, coarse_run, joint, recorded, series
 from tests.known_simulators import of_waves
 
 UNFITTED = of_waves([SquareWaveSimulator([SquareWave(40.0)])], 64)
@@ -17,31 +16,26 @@ UNFITTED = of_waves([SquareWaveSimulator([SquareWave(40.0)])], 64)
 
 @pytest.fixture(scope="module")
 def newer():
-    (telemetry,) = join_channels({"volts": series(seed=9)})
-    return dataclasses.replace(telemetry, parts=(Part(3 * telemetry.parts[0].values + 10),))
+    return recorded(3 * series(seed=9).values + 10)
 
 
 def test_the_new_level_gain_and_noise_are_reported(single, newer):
     updated, report = update(single[0], newer)
     before, after = report.before, report.after  # the wave from 3 to 7 becomes one from 19 to 31
-    assert before.level["volts"] == pytest.approx(5, rel=0.02) and after.level[
-        "volts"
-    ] == pytest.approx(25, rel=0.02)
+    levels = before.level["volts"], after.level["volts"]
+    assert levels == pytest.approx((5, 25), rel=0.02)
     assert after.gain["volts"] / before.gain["volts"] == pytest.approx(3, rel=0.05)
-    assert report.after.noise_sd["volts"] == pytest.approx(0.3, rel=0.2) and single[
-        0
-    ].noise_sd == pytest.approx(0.1, rel=0.2)
-    assert (
-        report.before.alarms > 0.9 > 0.1 > report.after.alarms
-        and updated.trained["updates"][0]["num_samples"] == 3_000
-    )
+    noise_sd = single[0].noise_sd[0], after.noise_sd["volts"]
+    assert noise_sd == pytest.approx((0.1, 0.3), rel=0.2)
+    assert before.alarms > 0.9 > 0.1 > after.alarms
+    assert updated.trained["updates"][0]["num_samples"] == 3_000
     assert "above the threshold" in report.lines()[-1] and report.to_dict()["channels"] == ["volts"]
 
 
 def test_alarms_after_an_update_are_of_views_that_have_not_learnt_the_held_out_end(single):
     values = series(seed=9).values.copy()
     values[2_400:] += 1.0  # half of the wave, ten standard deviations of the noise
-    moved = Telemetry.of(values, 10.0, 0.0, series().start, "volts")
+    moved = recorded(values)
     report = update(single[0], moved)[1]
     assert report.after.alarms == fit(moved, options=QUICK)[1].false_alarms > 0.9
     assert report.num_held_out == 600
@@ -61,8 +55,7 @@ def test_parts_that_are_shorter_than_the_longest_windows_of_views_suffice():
     quick = dataclasses.replace(QUICK, window=32, num_windows=100)
     simulator, _ = fit(series(1_500), options=quick)
     parts = [series(1_500).part(first, first + 62) for first in range(0, 1_488, 80)]
-    (telemetry,) = join_channels({"volts": parts})
-    assert update(simulator, telemetry)[1].after.alarms < 0.1
+    assert update(simulator, one_series(parts))[1].after.alarms < 0.1
 
 
 @pytest.mark.parametrize(

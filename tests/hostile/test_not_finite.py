@@ -15,19 +15,14 @@ from enhsim_tf.fitting.fit import fit
 from enhsim_tf.fitting.options import FitOptions
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.scoring.score import score
-from enhsim_tf.telemetry.joining import join_channels
-from enhsim_tf.telemetry.series import Part, Telemetry
-from tests.known_simulators import of_waves, parts_of
+from tests.fitted_simulators import recorded
+from tests.known_simulators import of_waves
 
 TINY = FitOptions(window=64, num_windows=40, enhancer="ridge", noise="residual windows")
 PLACES = np.arange(1_500)
 WAVE = np.sin(2 * np.pi * PLACES / 60)
 NOISE = 0.1 * np.random.default_rng(0).standard_normal(1_500)
 SPIKE = np.where(PLACES == 900, 1.0, 0.0)
-
-
-def channel(values):
-    return [Telemetry.of(np.asarray(values, np.float32), name="volts")]
 
 
 FITTED = {
@@ -47,7 +42,7 @@ REFUSED = {
 def test_a_hostile_channel_gets_a_finite_model_without_a_warning(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
-        simulator = fit(channel(FITTED[name]), options=TINY)[0]
+        simulator = fit(recorded(FITTED[name]), options=TINY)[0]
         series, windows = simulator.generate_series(300, seed=1), simulator.generate(5, seed=1)
     assert np.isfinite(series).all() and np.isfinite(windows).all()
 
@@ -57,7 +52,7 @@ def test_a_channel_that_no_network_can_learn_is_refused_in_one_line(name, refuse
     values, word = REFUSED[name]
     with warnings.catch_warnings(), refused(word):
         warnings.simplefilter("error", RuntimeWarning)
-        fit(channel(values), options=TINY)
+        fit(recorded(values), options=TINY)
 
 
 def broken(simulator, which):
@@ -73,16 +68,14 @@ def broken(simulator, which):
     return simulator
 
 
-RUN = parts_of(
-    (Part(np.random.default_rng(1).standard_normal((1_500, 1)).astype(np.float32)),), ("watts",)
-)
+RUN = recorded(np.random.default_rng(1).standard_normal(1_500), "watts")
 
 
 @pytest.fixture(scope="module")
 def of_run():
     """A simulator of recorded runs whose enhancer is ridge regression."""
-    values = np.convolve(RUN.parts[0].values[:, 0], [0.3, 0.4, 0.3], "same") + NOISE
-    return fit(channel(values), RUN, dataclasses.replace(TINY, num_windows=60))[0]
+    values = np.convolve(RUN.values[:, 0], [0.3, 0.4, 0.3], "same") + NOISE
+    return fit(recorded(values), RUN, dataclasses.replace(TINY, num_windows=60))[0]
 
 
 @pytest.mark.parametrize("which", ["enhancer", "noise"])
@@ -90,7 +83,6 @@ def of_run():
 def test_what_is_not_finite_is_neither_generated_nor_scored(kind, which, of_run, refused, tmp_path):
     waves = of_waves([SquareWaveSimulator([SquareWave(40)])], 64)
     simulator = broken(waves if kind == "waves" else of_run, which)
-    (telemetry,), run = join_channels({"volts": channel(WAVE)}), None if kind == "waves" else RUN
     uses = [
         lambda: simulator.generate(3),
         lambda: simulator.generate_series(200),
@@ -100,12 +92,11 @@ def test_what_is_not_finite_is_neither_generated_nor_scored(kind, which, of_run,
             simulator,
         ),
     ]
-    for use in (
-        uses if kind == "waves" else [*uses, lambda: list(simulator.generate_copies(RUN, 1))]
-    ):
+    if kind == "runs":
+        uses.append(lambda: list(simulator.generate_copies(RUN, 1)))
+    if (kind, which) == ("runs", "enhancer"):  # the noise is not scored
+        uses.append(lambda: score(simulator, recorded(WAVE), RUN))
+    for use in uses:
         with refused("finite", "Fit it again"):
             use()
-    if (kind, which) == ("runs", "enhancer"):  # the noise is not scored
-        with refused("finite", "Fit it again"):
-            score(simulator, telemetry, run)
     assert not list(tmp_path.iterdir())

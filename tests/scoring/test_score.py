@@ -16,41 +16,35 @@ from enhsim_tf.scoring.score import (
     scorer_of,
     write_scores,
 )
-from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.series import Clock, Part
-from tests.fitted_simulators import coarse_run, joint, series
+from tests.fitted_simulators import coarse_run, joint, recorded, series
 from tests.known_simulators import of_waves
 
-
-def with_parts(recording, *parts):
-    return dataclasses.replace(recording, parts=parts)
+TELEMETRY = series(seed=5)
 
 
 def on_clock(recording, interval_s, start):
     return dataclasses.replace(recording, clock=Clock.of(interval_s, start))
 
 
-def changed(recording, begin, end, by, channel=0):
-    values = recording.parts[0].values.copy()
+def changed(begin, end, by, channel=0, recording=TELEMETRY):
+    """A recording, by default of one channel, with other values from one sample to another."""
+    values = recording.values.copy()
     values[begin:end, channel] += by
-    return with_parts(recording, Part(values))
+    return recorded(values, recording.columns)
 
 
-def after_gap(recording, begin, offset_s):
-    """A recording of which the samples from one on come later."""
+def after_gap(recording, end, offset_s, begin=None):
+    """A recording whose samples from one on come later; those before it, after the end of the first
+    part, are left out.
+    """
     values = recording.values
-    return with_parts(recording, Part(values[:begin]), Part(values[begin:], offset_s))
+    parts = Part(values[:end]), Part(values[begin or end :], offset_s)
+    return dataclasses.replace(recording, parts=parts)
 
 
-@pytest.fixture(scope="module")
-def telemetry():
-    return join_channels({"volts": series(seed=5)})[0]
-
-
-def test_a_fault_is_one_event_with_its_onset_its_views_and_nominal_time_is_not_flagged(
-    single, telemetry
-):
-    scored = score(single[0], changed(telemetry, 1_000, 1_300, 4.0))
+def test_a_fault_is_one_event_with_its_onset_its_views_and_nominal_time_is_not_flagged(single):
+    scored = score(single[0], changed(1_000, 1_300, 4.0))
     frame = scored.table
     (event,) = scored.events
     window = scored.window
@@ -62,9 +56,9 @@ def test_a_fault_is_one_event_with_its_onset_its_views_and_nominal_time_is_not_f
     assert scored.departure == "" and scored.not_judged == ()
 
 
-def test_the_past_alone_raises_the_alarm_with_the_sample_that_is_said(single, telemetry):
+def test_the_past_alone_raises_the_alarm_with_the_sample_that_is_said(single):
     """With all telemetry until then the first sample is flagged, with a stride less it is not."""
-    faulty = changed(telemetry, 1_000, 1_300, 4.0)
+    faulty = changed(1_000, 1_300, 4.0)
     scored = score(single[0], faulty)
     (event,) = scored.events
     flagged = int(np.argmax(scored.table["flag"]))
@@ -73,8 +67,8 @@ def test_the_past_alone_raises_the_alarm_with_the_sample_that_is_said(single, te
     assert (known[:flagged] <= 1).all()
 
 
-def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
-    given = changed(telemetry, 1_000, 1_200, 0.5)
+def test_scores_of_a_run_are_of_the_difference_from_it(of_run):
+    given = changed(1_000, 1_200, 0.5)
     frame = score(of_run[0], given, coarse_run()).table
     assert {"value", "enhanced", "score", "flag", "out_of_range"} <= set(frame.columns)
     assert frame["score"].iloc[1_020:1_180].min() > 1 and frame["flag"].iloc[:900].mean() < 0.05
@@ -82,10 +76,9 @@ def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
     assert np.std(frame["value"] - frame["enhanced"]) < 0.25
 
 
-def test_an_event_ends_where_the_run_has_a_gap(of_run, telemetry):
-    values = coarse_run().values
-    run = with_parts(coarse_run(), Part(values[:1_500]), Part(values[1_600:], 16_000.0))
-    scored = score(of_run[0], changed(telemetry, 1_300, 3_000, 0.5), run)
+def test_an_event_ends_where_the_run_has_a_gap(of_run):
+    run = after_gap(coarse_run(), 1_500, 16_000.0, 1_600)
+    scored = score(of_run[0], changed(1_300, 3_000, 0.5), run)
     before = next(event for event in scored.events if abs(event.begin - 1_300) <= 8)
     after = scored.events[scored.events.index(before) + 1]
     assert before.end == 1_500 and after.begin == 1_600
@@ -94,16 +87,15 @@ def test_an_event_ends_where_the_run_has_a_gap(of_run, telemetry):
     assert ends[scored.events.index(before)] == pd.Timedelta(seconds=15_000)
 
 
-def test_no_event_has_its_peak_before_it_begins(of_run, telemetry):
-    events = score(of_run[0], telemetry, coarse_run(), ScoreOptions(0.2)).events
+def test_no_event_has_its_peak_before_it_begins(of_run):
+    events = score(of_run[0], TELEMETRY, coarse_run(), ScoreOptions(0.2)).events
     assert events and all(one.begin <= one.peak < one.end for one in events)
 
 
-def test_samples_without_a_run_get_no_score(of_run, telemetry):
-    frame = score(of_run[0], telemetry, coarse_run(2_000)).table
+def test_samples_without_a_run_get_no_score(of_run):
+    frame = score(of_run[0], TELEMETRY, coarse_run(2_000)).table
     assert frame["score"].isna().sum() == 1_000 and not frame["flag"].iloc[2_000:].any()
-    late = with_parts(telemetry, Part(telemetry.values[500:], 5_000.0))
-    frame = score(of_run[0], late, coarse_run(2_000)).table
+    frame = score(of_run[0], TELEMETRY.part(500, 3_000), coarse_run(2_000)).table
     assert frame["score"].isna().tolist() == [False] * 1_500 + [True] * 1_000
     assert frame["flag"].mean() < 0.05
 
@@ -129,8 +121,8 @@ def test_an_event_of_a_fast_clock_ends_one_interval_after_its_last_sample():
     assert row_of_event(clock, times, 1, 3, 2, 2, 2)["end"] == times[3]
 
 
-def test_times_of_a_clock_from_zero_are_written_as_seconds(single, telemetry, tmp_path):
-    given = on_clock(changed(telemetry, 1_500, 3_000, 6.0), 10.0, "1970-01-01")
+def test_times_of_a_clock_from_zero_are_written_as_seconds(single, tmp_path):
+    given = on_clock(changed(1_500, 3_000, 6.0), 10.0, "1970-01-01")
     scored = score(single[0], given)
     write_scores(tmp_path / "scores.CSV", scored)
     written = pd.read_csv(tmp_path / "scores.CSV")
@@ -141,9 +133,9 @@ def test_times_of_a_clock_from_zero_are_written_as_seconds(single, telemetry, tm
     assert f"since {begin_s} s" in scored.departure
 
 
-def test_a_lasting_change_is_one_event_since_its_time_and_names_update(single, telemetry):
+def test_a_lasting_change_is_one_event_since_its_time_and_names_update(single):
     # after a gap of a hundred samples
-    given = after_gap(changed(telemetry, 1_500, 3_000, 6.0), 1_200, 13_000.0)
+    given = after_gap(changed(1_500, 3_000, 6.0), 1_200, 13_000.0)
     scored = score(single[0], given)
     frame = scored.table
     (event,) = scored.events
@@ -159,24 +151,23 @@ def test_a_lasting_change_is_one_event_since_its_time_and_names_update(single, t
     assert frame["flag"].iloc[1_700:].mean() < 0.02
 
 
-def test_a_fault_within_a_departure_is_an_event_against_the_new_operating_point(single, telemetry):
-    values = changed(changed(telemetry, 1_000, 3_000, 6.0), 2_200, 2_400, 9.0)
-    departure, later = score(single[0], values).events
+def test_a_fault_within_a_departure_is_an_event_against_the_new_operating_point(single):
+    given = changed(2_200, 2_400, 9.0, recording=changed(1_000, 3_000, 6.0))
+    departure, later = score(single[0], given).events
     assert abs(departure.begin - 1_000) <= 8 and departure.end == 3_000
     assert later.against == "new operating point" and abs(later.begin - 2_200) <= 8
 
 
-def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, telemetry):
-    # begins 500 samples later
-    run = with_parts(coarse_run(), Part(coarse_run().values[500:], 5_000.0))
-    scored = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), run)
+def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run):
+    run = coarse_run().part(500, 3_000)
+    scored = score(of_run[0], changed(1_500, 3_000, 6.0), run)
     event = scored.events[-1]
     assert "level" in scored.departure and abs(event.begin - 1_500) <= 8
     assert event.end == 3_000 and scored.table["score"].iloc[:500].isna().all()
 
 
 def test_a_channel_that_is_missing_leaves_the_others_judged(both):
-    watts = changed(joint(seed=1), 1_000, 1_200, -60.0, channel=1).select(["watts"])
+    watts = changed(1_000, 1_200, -60.0, 1, joint(seed=1)).select(["watts"])
     scored = score(both[0], watts)
     (event,) = scored.events
     assert scored.not_judged == ("volts",) and event.channels == ("watts",)
@@ -187,18 +178,18 @@ def test_a_channel_that_is_missing_leaves_the_others_judged(both):
 
 @pytest.mark.parametrize(("channel", "by"), [(0, 4.0), (1, -60.0)])
 def test_the_channel_that_fails_is_named(both, channel, by):
-    (event,) = score(both[0], changed(joint(seed=1), 1_000, 1_200, by, channel)).events
+    (event,) = score(both[0], changed(1_000, 1_200, by, channel, joint(seed=1))).events
     assert event.channels[0] == ("volts", "watts")[channel]
 
 
-def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
+def test_telemetry_that_does_not_fit_is_refused(single, both, of_run):
     # within a thousandth
-    single[0].pair(on_clock(telemetry, 10.005, telemetry.start))
+    single[0].pair(on_clock(TELEMETRY, 10.005, TELEMETRY.start))
     for words, (simulator, _), given in (
-        ("sample every 10 s", single, on_clock(telemetry, 1.0, telemetry.start)),
-        ("at least one window of 80", single, with_parts(telemetry, Part(telemetry.values[:63]))),
-        ("channels volts, watts", both, dataclasses.replace(joint(), columns=("volts", "amps"))),
-        ("--coarse", of_run, telemetry),
+        ("sample every 10 s", single, on_clock(TELEMETRY, 1.0, TELEMETRY.start)),
+        ("at least one window of 80", single, TELEMETRY.part(0, 63)),
+        ("channels volts, watts", both, recorded(joint().values, ("volts", "amps"))),
+        ("--coarse", of_run, TELEMETRY),
     ):
         with pytest.raises(InputError, match=words):
             score(simulator, given)
@@ -216,36 +207,36 @@ def test_more_false_alarms_lower_the_threshold(single):
     assert often.threshold < rare.threshold and often.rate == 0.2
 
 
-def test_an_event_at_the_beginning_of_a_part_is_not_detected_before_it_begins(single, telemetry):
-    (event,) = score(single[0], changed(telemetry, 104, 400, 4.0)).events
+def test_an_event_at_the_beginning_of_a_part_is_not_detected_before_it_begins(single):
+    (event,) = score(single[0], changed(104, 400, 4.0)).events
     assert abs(event.begin - 104) <= 8 and 104 <= event.detected <= 104 + 64
 
 
-def test_a_fault_that_goes_on_after_a_gap_is_an_event_of_both_parts(single, telemetry):
-    given = after_gap(changed(telemetry, 1_000, 2_000, 6.0), 1_200, 20_000.0)
+def test_a_fault_that_goes_on_after_a_gap_is_an_event_of_both_parts(single):
+    given = after_gap(changed(1_000, 2_000, 6.0), 1_200, 20_000.0)
     before, after, *_ = score(single[0], given).events
     assert abs(before.begin - 1_000) <= 8 and before.end == after.begin == 1_200
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_values_that_are_not_finite_are_refused(single, telemetry, refused, value):
+def test_values_that_are_not_finite_are_refused(single, refused, value):
     with refused("finite"):
-        score(single[0], changed(telemetry, 1_000, 1_001, value))
+        score(single[0], changed(1_000, 1_001, value))
 
 
 def test_channels_keep_their_values_whatever_their_names(both):
     names = ("score", "enhanced score")
     renamed = copy.copy(both[0])
     renamed.channels = names
-    scored = score(renamed, dataclasses.replace(joint(seed=1), columns=names))
+    scored = score(renamed, recorded(joint(seed=1).values, names))
     values = scored.table[[scored.columns[name] for name in names]]
     np.testing.assert_array_equal(values, joint(seed=1).values)
     assert list(scored.table)[2:] == ["score", "flag"]
 
 
-def test_the_enhanced_run_is_told_beside_an_outlier(of_run, telemetry):
+def test_the_enhanced_run_is_told_beside_an_outlier(of_run):
     calm, spoilt = (
-        score(of_run[0], changed(telemetry, 500, 501, by), coarse_run()).table["enhanced"]
+        score(of_run[0], changed(500, 501, by), coarse_run()).table["enhanced"]
         for by in (0.0, 1e12)
     )
     np.testing.assert_array_equal(spoilt, calm)

@@ -13,7 +13,7 @@ from enhsim_tf.coarse.waves import Waves
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.fitting import fitted, report
 from enhsim_tf.simulator import simulator
-from enhsim_tf.telemetry.series import Clock, Part
+from enhsim_tf.telemetry.series import Clock, Part, Telemetry
 from tests.fitted_simulators import coarse_run
 from tests.known_simulators import parts_of
 
@@ -148,23 +148,21 @@ def test_each_part_of_telemetry_meets_the_run_of_its_own_time():
         np.random.default_rng(seed).standard_normal((100, 1)).astype(np.float32) for seed in (0, 1)
     )
     telemetry = parts_of((Part(first, 0.0), Part(second, 1_500.0)), ("a",), 10.0, START)
-    values = coarse_run(300).parts[0].values
-    late = dataclasses.replace(coarse_run(300), parts=(Part(values[50:], 500.0),))
-    paired = Runs(coarse_run(), ["a"], 40, delay_s=20.0).pair(telemetry, late)
+    run = coarse_run(300).part(50, 300)
+    paired = Runs(coarse_run(), ["a"], 40, delay_s=20.0).pair(telemetry, run)
     found, coarse = paired.telemetry, paired.run
     assert paired.places_in(telemetry) == [52, 100]
     for part, expected in zip(found.parts, (first[52:], second), strict=True):
         np.testing.assert_array_equal(part.values, expected)
-    for part, expected in zip(coarse.parts, (values[50:98], values[148:248]), strict=True):
+    for part, expected in zip(coarse.parts, (run.values[:48], run.values[98:198]), strict=True):
         np.testing.assert_allclose(part.values, expected, atol=1e-6)
     for telemetry in (found, coarse):
         assert [part.offset_s for part in telemetry.parts] == [520.0, 1_500.0]
 
 
 def test_parts_between_two_samples_of_the_clock_keep_their_places():
-    telemetry = parts_of((Part(np.zeros((20, 1), np.float32), 10.5),), ("a",))
-    late = dataclasses.replace(telemetry, parts=(Part(np.zeros((17, 1), np.float32), 13.5),))
-    assert Paired(late).places_in(telemetry) == [3]
+    telemetry = Telemetry.of(np.zeros(20, np.float32), offset_s=10.5)
+    assert Paired(telemetry.part(3, 20)).places_in(telemetry) == [3]
 
 
 def test_a_run_of_another_rate_or_without_a_window_is_refused():
@@ -178,7 +176,7 @@ def test_a_run_of_another_rate_or_without_a_window_is_refused():
 
 
 def test_windows_of_a_run_begin_again_after_the_last():
-    values = coarse_run(100).parts[0].values
+    values = coarse_run(100).values
     runs, starts = Runs(coarse_run(100), ["a"], 80), np.array([0, 20, 21, 43])
     drawn = runs.draw(starts, [None] * 4, np.random.default_rng(0)).coarse
     np.testing.assert_array_equal(drawn, [values[:80], values[20:], values[:80], values[1:81]])

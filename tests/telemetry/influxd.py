@@ -32,8 +32,8 @@ def find_influxd():
 
 
 class Server:
-    """A server started by the tests: its URL, organisation and token, and methods to start, kill
-    and end it.
+    """A server started by the tests: its URL, organisation and token, and methods to start and kill
+    it.
     """
 
     def __init__(self, program, folder):
@@ -86,7 +86,3 @@ class Server:
     def kill(self):
         self.process.kill()
         self.process.wait()
-
-    def end(self):
-        self.process.terminate()
-        self.process.wait(30)
