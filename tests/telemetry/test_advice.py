@@ -2,7 +2,6 @@
 read right, or reads at the end why it cannot be and what to do.
 """
 
-import shlex
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
 from tests.telemetry.robot import follow, in_folder
-from tests.telemetry.test_forms import REFUSED
 
 SHARED = Path(__file__).parents[3] / "shared"
 CASES = [
@@ -72,17 +70,6 @@ def test_the_advice_leads_to_the_right_telemetry_or_says_why_not(path, line):
     assert any(ending.channels for ending in endings), endings
     if name in RIGHT:
         assert any(is_right(ending, RIGHT[name]) for ending in endings), endings
-
-
-@pytest.mark.parametrize("form", REFUSED)
-def test_the_advice_for_a_form_of_our_own_ends(written, form):
-    endings = follow([shlex.quote(str(written(REFUSED[form][0])))])
-    assert any(ending.channels for ending in endings) or all(
-        ending.message.rpartition(". ")[2].split()[0] in ADVICE for ending in endings
-    ), endings
-
-
-ADVICE = "Give Write Rename Read Correct Name Add Convert Choose Save Complete".split()
 
 
 ROWS = [f"{number},{number + 0.5},{number + 0.25}" for number in range(50)]
