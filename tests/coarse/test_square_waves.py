@@ -154,13 +154,27 @@ def test_onset_is_the_sample_asked_for(onset):
     assert np.argmax(values[0] != 5) == round(100 * onset)
 
 
+BEGIN, LATE = TIMES[:, ONSET : ONSET + 1], TIMES[:, ONSET:]
+
+
+@pytest.mark.parametrize(
+    ("mode", "expected"),
+    [
+        ("gain_loss", 1 + (LATE - 1) / 2),  # the mean of both levels is 1
+        ("drift", LATE + 0.5 * 4 * np.linspace(0, 1, 300)),  # they are 4 apart
+        ("period_change", BEGIN + (LATE - BEGIN) / 1.5),
+    ],
+)
+def test_modes_without_draws_in_closed_form(mode, expected):
+    np.testing.assert_allclose(by_time(mode, 0.5)[:, ONSET:], expected)
+
+
 def test_stuck_stands_still_for_its_fraction_and_then_catches_up():
     clock = by_time("stuck", 0.5)
-    begin, late = TIMES[:, ONSET : ONSET + 1], TIMES[:, ONSET:]
-    still = late <= begin + 0.5 * 299  # half of the 299 s that are left
-    assert (clock[:, ONSET:] == np.where(still, begin, late)).all()
+    still = LATE <= BEGIN + 0.5 * 299  # half of the 299 s that are left
+    assert (clock[:, ONSET:] == np.where(still, BEGIN, LATE)).all()
     assert still.sum(axis=1).tolist() == [150] * 3
-    assert (by_time("stuck", 1.0)[:, ONSET:] == begin).all()
+    assert (by_time("stuck", 1.0)[:, ONSET:] == BEGIN).all()
 
 
 def test_friction_delays_by_a_bounded_lag_and_never_reverses():

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.paper.degraded import degrade
 from enhsim_tf.paper.square_wave import square_wave
 from enhsim_tf.paper.telemetry import (
     ParquetStore,
@@ -75,19 +74,3 @@ def test_a_square_wave_is_high_in_the_first_half_of_its_period():
     np.testing.assert_array_equal(
         square_wave(np.array([0, 59, 60, 119, 120]), 120, 0.25), [0.25, 0.25, -0.25, -0.25, 0.25]
     )
-
-
-def degraded(signal, time, mode, severity):
-    return degrade(
-        signal, time, mode, severity, (-0.75, 0.75), 120.0, np.random.default_rng(0), 100
-    )
-
-
-def test_degraded_values_worked_out_by_hand():
-    time = np.arange(400.0)[None]
-    late = SIGNAL(time[0, 100:])
-    np.testing.assert_allclose(degraded(SIGNAL, time, "gain_loss", 0.5)[0, 100:], late / 2)
-    np.testing.assert_allclose(degraded(SIGNAL, time, "stuck", 1.0)[0, 100:], late[0])
-    np.testing.assert_allclose(degraded(SIGNAL, time, "drift", 0.5)[0, -1], late[-1] + 0.75)
-    stretched = SIGNAL(100 + (time[0, 100:] - 100) / 1.5)
-    np.testing.assert_allclose(degraded(SIGNAL, time, "period_change", 0.5)[0, 100:], stretched)
