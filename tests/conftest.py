@@ -8,7 +8,6 @@ import gc
 import os
 import signal
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -33,7 +32,6 @@ os.environ.setdefault("RAY_gcs_server_port_wait_time_s", "120")
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
 
-ROOT = Path(__file__).parents[1]
 SLOW = "--slow"
 LEFT = pytest.StashKey[int]()
 

@@ -15,8 +15,8 @@ from enhsim_tf.common.atomic_files import (
     replace_files,
     replace_folder,
 )
+from tests.clone import ROOT, python
 
-ROOT = Path(__file__).parents[2]
 KILLED = """
 import os, signal, sys
 from enhsim_tf.common import atomic_files
@@ -56,8 +56,7 @@ def is_only(folder, name, text):
 
 def run(script, renames, *paths):
     """The exit code of a process that is killed after so many renames."""
-    words = [sys.executable, "-c", KILLED + script, str(renames), *map(str, paths)]
-    return subprocess.run(words, cwd=ROOT).returncode
+    return python(KILLED + script, str(renames), *map(str, paths)).returncode
 
 
 def killed(path, what, renames):

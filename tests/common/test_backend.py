@@ -3,13 +3,12 @@ terminal.
 """
 
 import os
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.clone import python
+
 START = "from enhsim_tf.common.backend import keras, tf\n"
 # whether oneDNN's kernels are on, as TensorFlow itself says
 STATE = (
@@ -22,13 +21,7 @@ def run(code, **environment):
     """Runs code in a separate process, whose environment contains only the given settings."""
     ours = ("TF_", "ONEDNN_", "DNNL_", "KERAS_", "MALLOC_", "GLIBC_TUNABLES")
     clean = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env=clean | environment,
-        capture_output=True,
-        text=True,
-    )
+    return python(code, env=clean | environment)
 
 
 def test_it_starts_without_a_message_and_gives_standard_error_back():

@@ -4,9 +4,6 @@ where it was asked for.
 
 import os
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +11,8 @@ import pytest
 from enhsim_tf.common.console import SILENT, Progress, run_command
 from enhsim_tf.fitting.fit import fit
 from enhsim_tf.fitting.options import FitOptions
-from enhsim_tf.telemetry.series import Telemetry
-
-ROOT = Path(__file__).parents[2]
+from tests.clone import python
+from tests.fitted_simulators import recorded
 
 
 @pytest.mark.parametrize(
@@ -26,13 +22,8 @@ ROOT = Path(__file__).parents[2]
 def test_a_line_is_printed_at_once_in_the_characters_of_the_encoding(encoding, printed):
     # os._exit discards unwritten output
     script = "import os\nfrom enhsim_tf.common.console import tell\ntell('Größe 漢')\nos._exit(0)"
-    ended = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=ROOT,
-        capture_output=True,
-        env=os.environ | {"PYTHONIOENCODING": encoding},
-    )
-    assert (ended.stdout.decode(encoding), ended.stderr) == (printed, b"")
+    ended = python(script, env=os.environ | {"PYTHONIOENCODING": encoding}, encoding=encoding)
+    assert (ended.stdout, ended.stderr) == (printed, "")
 
 
 def test_a_loop_tells_how_far_it_is_at_most_every_fifteen_seconds():
@@ -56,7 +47,7 @@ def test_a_loop_tells_how_far_it_is_at_most_every_fifteen_seconds():
 def test_a_fit_names_its_steps_where_it_is_asked_to(capsys):
     rng, told = np.random.default_rng(0), []
     values = np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)
-    telemetry = Telemetry.of(values.astype(np.float32))
+    telemetry = recorded(values)
     options = FitOptions(window=60, num_windows=60, enhancer="ridge", noise="residual windows")
     for progress in (SILENT, Progress(told.append, "volts: ")):
         fit(telemetry, options=options, progress=progress)

@@ -6,7 +6,6 @@ import os
 import platform
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,9 +13,9 @@ import pytest
 
 from enhsim_tf.coarse.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.model import Enhancer
+from tests.clone import ROOT
 from tests.known_simulators import of_waves
 
-ROOT = Path(__file__).parents[2]
 # OpenBLAS chooses the kernels of another processor; one of them may be what runs here
 OTHERS = "Nehalem", "Haswell"  # an older processor, and one without AVX-512
 

@@ -10,13 +10,13 @@ import multiprocessing
 import os
 import signal
 import sys
-from pathlib import Path
 
 import pytest
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
+from tests.clone import ROOT
 from tests.ray_servers import starts_ray
 from tests.small_data_set import (
     PlainMaker,
@@ -28,7 +28,6 @@ from tests.small_data_set import (
     threads_of,
 )
 
-ROOT = Path(__file__).parents[2]
 with_ray = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed"
 )

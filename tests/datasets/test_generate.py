@@ -5,7 +5,6 @@ files.
 import itertools
 import json
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -26,9 +25,9 @@ from enhsim_tf.datasets.generate import find_problems, generate_data_set, locked
 from enhsim_tf.datasets.labelled_windows import make_plan, shard_file
 from enhsim_tf.datasets.places import ScenarioRange
 from enhsim_tf.simulator.simulator import EnhancedSimulator
+from tests.clone import ROOT, blocks_of
 from tests.small_data_set import SCENARIOS, PlainMaker, plain, plan
 
-ROOT = Path(__file__).parents[2]
 COMMAND = ROOT / "tests" / "small_data_set.py"
 
 
@@ -362,11 +361,7 @@ def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, c
 # reading
 
 
-DOCS = re.findall(
-    r"```python\n(.*?)```",
-    (ROOT / "docs" / "large_data_sets.md").read_text(encoding="utf-8"),
-    re.DOTALL,
-)
+DOCS = blocks_of("docs/large_data_sets.md")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The book without building it, the marked tables of its pages, and the code of CONTRIBUTING.md."""
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -9,8 +8,7 @@ import enhsim_tf
 from book import __main__ as command
 from book import tables
 from enhsim_tf.common.errors import InputError
-
-ROOT = Path(__file__).parents[2]
+from tests.clone import ROOT
 
 
 def test_every_page_is_in_the_table_of_contents():

@@ -4,15 +4,12 @@ Which package may import which is declared in `pyproject.toml` and checked by `l
 """
 
 import importlib
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.clone import ROOT, python
+
 PACKAGE = ROOT / "enhsim_tf"
 WITH_NETWORKS = "common.backend", "common.fast_keras"
 NOT_TRIED = ("paper", "own_channel", "__main__")
@@ -28,13 +25,7 @@ def modules_without_networks():
 
 def run(script, **options):
     """Runs Python in a new process, which must end well, and returns its standard error."""
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        **options,
-    )
+    done = python(script, **options)
     assert done.returncode == 0, done.stderr
     return done.stderr
 

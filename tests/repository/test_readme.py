@@ -1,26 +1,15 @@
 """The README: its program prints what stands below it, in any folder."""
 
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 from enhsim_tf import example
-
-ROOT = Path(__file__).parents[2]
+from tests.clone import ROOT, python
 
 
 def test_the_program_prints_what_stands_below_it(tmp_path):
     blocks = re.findall(r"```(\w*)\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
     place = next(number for number, (kind, _) in enumerate(blocks) if kind == "python")
-    printed = subprocess.check_output(
-        [sys.executable, "-c", blocks[place][1]],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        text=True,
-    )
-    assert printed == blocks[place + 1][1]
+    assert python(blocks[place][1], cwd=tmp_path).stdout == blocks[place + 1][1]
 
 
 def test_an_unknown_example_is_refused(refused):

@@ -7,10 +7,9 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.__main__ import main
+from tests.clone import ROOT, blocks_of
 
-TESTS = Path(__file__).parents[1]
-PAGE = (TESTS.parent / "docs" / "own_simulator.md").read_text(encoding="utf-8")
-BLOCKS = [part.partition("```")[0] for part in PAGE.split("```python")[1:]]
+BLOCKS = blocks_of("docs/own_simulator.md")
 
 
 @pytest.fixture
@@ -49,7 +48,7 @@ def test_the_example_with_a_function_runs(folder):
 def test_the_example_with_an_fmu_runs(folder):
     pytest.importorskip("fmpy", reason="the extra fmi is not installed")
     builder = pytest.importorskip("pythonfmu.builder", reason="pythonfmu is not installed")
-    builder.FmuBuilder.build_FMU(TESTS / "coarse" / "heater_fmu.py", dest=folder)
+    builder.FmuBuilder.build_FMU(ROOT / "tests" / "coarse" / "heater_fmu.py", dest=folder)
     command = (np.sin(np.arange(300) / 15) > 0).astype(int)
     pd.DataFrame(
         {"time": pd.date_range("2024-01-01", periods=300, freq="10s"), "command": command}

@@ -3,18 +3,16 @@ any work.
 """
 
 import http.server
-import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from enhsim_tf.telemetry import influx_store
 from enhsim_tf.telemetry.influx_store import VARIABLES, InfluxLocation, InfluxStore, parse_location
+from tests.clone import answered
 
-ROOT = Path(__file__).parents[2]
 POINTS = np.arange(3), np.ones(3, np.float32)
 
 
@@ -58,19 +56,6 @@ ODD = {
 }
 
 
-@pytest.mark.parametrize("name", ODD)
-def test_an_answer_without_numbers_is_refused(name, refused):
-    with refused("a field of numbers"):
-        influx_store._parse(ODD[name])
-
-
-@pytest.mark.parametrize("name", VARIABLES)
-def test_a_missing_variable_is_named(pretended, monkeypatch, refused, name):
-    monkeypatch.setenv(name, " ")
-    with refused(f"no {name}"):
-        InfluxStore("influxdb://b/m/f")
-
-
 def test_a_missing_client_is_named(pretended, monkeypatch, refused):
     monkeypatch.setitem(sys.modules, "influxdb_client", None)
     with refused("pip install influxdb-client"):
@@ -82,10 +67,22 @@ URLS = "localhost:8086|ftp://localhost|http://|http://[|http://a:b|http://a:0|ht
 )
 
 
-@pytest.mark.parametrize("url", URLS)
-def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
-    monkeypatch.setenv("INFLUXDB_V2_URL", url)
-    with refused("INFLUXDB_V2_URL") as caught:
+@pytest.mark.parametrize("name", ODD)
+def test_an_answer_without_numbers_is_refused(name, refused):
+    with refused("a field of numbers"):
+        influx_store._parse(ODD[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [(name, " ", f"no {name}") for name in VARIABLES]
+    + [("INFLUXDB_V2_URL", url, "INFLUXDB_V2_URL") for url in URLS],
+)
+def test_a_variable_that_is_missing_or_no_address_is_named(
+    pretended, monkeypatch, refused, name, value, words
+):
+    monkeypatch.setenv(name, value)
+    with refused(words) as caught:
         InfluxStore("influxdb://b/m/f")
     assert "secret" not in str(caught.value)
 
@@ -173,32 +170,22 @@ def test_a_write_has_one_client_which_is_closed(served, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("options", "word"),
+    ("store", "word"),
     [
-        (["--store", "influxdb"], "INFLUXDB_V2_TOKEN"),
-        (["--store", "influxdb://telemetry/m/f"], "no answer"),
-        (["--store", "influxdb://telemetry"], "influxdb://"),
-        (["--store", "sqlite"], "parquet, influxdb"),
+        ("influxdb", "INFLUXDB_V2_TOKEN"),
+        ("influxdb://telemetry/m/f", "no answer"),
+        ("influxdb://telemetry", "influxdb://"),
+        ("sqlite", "parquet, influxdb"),
     ],
 )
 def test_an_unusable_store_is_reported_before_any_work(
-    pretended, monkeypatch, tmp_path, options, word
+    pretended, monkeypatch, tmp_path, store, word
 ):
     if word == "INFLUXDB_V2_TOKEN":
         monkeypatch.delenv(word)
-    words = [*options, "--budget", "smoke"]
-    for folder in ("out", "cache"):
-        words += [f"--{folder}", str(tmp_path / folder)]
-    program = f"""
-import sys
-from enhsim_tf.reproduce import main
-code = main({words!r})
-print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} & set(sys.modules)))
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60
-    )
-    assert done.stdout == "2 []\n", done.stderr
+    words = f"--store {store} --budget smoke --out {tmp_path}/out --cache {tmp_path}/cache"
+    done = answered("enhsim_tf.reproduce", words.split())
+    assert (done.returncode, done.stdout) == (2, "set()\n"), done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith("error: Expected ") and word in done.stderr
     assert not list(tmp_path.iterdir())

@@ -1,8 +1,6 @@
 """The recipes of the docs for files that other libraries read, on files that are made here."""
 
-import re
 import struct
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,12 +8,11 @@ import pytest
 
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.sources import read_telemetry
+from tests.clone import blocks_of
 
 N = 300
 VALUES = (12 + np.sin(np.arange(N) / 9)).astype(np.float32)
-RECIPES = re.findall(
-    r"```python\n(.*?)```", (Path(__file__).parents[2] / "docs" / "forms.md").read_text(), re.DOTALL
-)
+RECIPES = blocks_of("docs/forms.md")
 
 
 def mdf(folder):
