@@ -16,19 +16,10 @@ def refused_line(tmp_path, capfd):
     def files():
         return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
 
-    def run(*arguments):
+    def run(words):
         before = files()
-        code = main(
-            [
-                "--out",
-                str(tmp_path / "out"),
-                "--cache",
-                str(tmp_path / "cache"),
-                "--budget",
-                "smoke",
-                *map(str, arguments),
-            ]
-        )
+        given = f"--out {tmp_path}/out --cache {tmp_path}/cache --budget smoke {words}"
+        code = main(given.split())
         out, error = capfd.readouterr()
         assert (code, out, error.count("\n")) == (2, "", 1)
         assert error.startswith("error: Expected ") and "Received: " in error
@@ -39,25 +30,25 @@ def refused_line(tmp_path, capfd):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "word"),
+    ("words", "said"),
     [
-        (["--seed", "-1"], "-1"),
+        ("--seed -1", "-1"),
         # the detectors and the classifier accept no larger seed
-        (["--seed", str(2**32)], str(2**32)),
-        (["--only", "fig99"], "fig99"),
-        (["--seed", "abc"], "'abc'"),
-        (["--budget", "tiny"], "'tiny'"),
-        (["--sed", "3"], "--sed 3"),
-        (["--set", "dropout"], "dropout"),
-        (["--set", "no_such=1"], "no_such"),
-        (["--set", "seed=1"], "--seed"),
-        (["--set", "budget=full"], "--budget"),
-        (["--column", "0"], "--telemetry"),
-        (["--telemetry", "no/such/file.npy"], "no/such/file.npy"),
+        (f"--seed {2**32}", str(2**32)),
+        ("--only fig99", "fig99"),
+        ("--seed abc", "'abc'"),
+        ("--budget tiny", "'tiny'"),
+        ("--sed 3", "--sed 3"),
+        ("--set dropout", "dropout"),
+        ("--set no_such=1", "no_such"),
+        ("--set seed=1", "--seed"),
+        ("--set budget=full", "--budget"),
+        ("--column 0", "--telemetry"),
+        ("--telemetry no/such/file.npy", "no/such/file.npy"),
     ],
 )
-def test_a_bad_option_is_refused_in_one_line(refused_line, arguments, word):
-    assert word in refused_line(*arguments)
+def test_a_bad_option_is_refused_in_one_line(refused_line, words, said):
+    assert said in refused_line(words)
 
 
 @pytest.mark.parametrize(
@@ -70,5 +61,5 @@ def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch,
     (tmp_path / "figures" / "fig02_source_target.png").write_text("full budget")
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "figures" if spelling == "absolute" else spelling
-    assert "smoke" in refused_line("--only", "fig02", "--out", out)
+    assert "smoke" in refused_line(f"--only fig02 --out {out}")
     assert (tmp_path / "figures" / "fig02_source_target.png").read_text() == "full budget"

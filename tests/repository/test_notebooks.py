@@ -159,11 +159,11 @@ def test_the_set_up_fetches_a_clone_and_starts_in_its_lessons(tmp_path):
     (clone / "notebooks" / "lesson_tools.py").write_text("found = True\n")
     (clone / "requirements.txt").write_text("")
     for command in (
-        ["init", "-q"],
-        ["add", "."],
-        ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-q", "-m", "first"],
+        "git init -q",
+        "git add .",
+        "git -c user.name=a -c user.email=a@b commit -q -m first",
     ):
-        subprocess.run(["git", *command], cwd=clone, check=True)
+        subprocess.run(command.split(), cwd=clone, check=True)
     code = build.SET_UP_CODE.format(address=clone.as_uri())
     twice = (
         f"{code}\nimport lesson_tools\n{code}\nprint(lesson_tools.found, "
