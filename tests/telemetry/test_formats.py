@@ -144,16 +144,35 @@ def test_words_are_channels_of_zero_and_one_on_request(written, refused):
     np.testing.assert_array_equal(telemetry.values[:, 2], mode == "RUN")
 
 
-def test_a_zone_above_the_table_of_a_sheet_is_asked_for(tmp_path, refused):
-    book, path = openpyxl.Workbook(), tmp_path / "a.xlsx"
-    times = pd.date_range("2024-03-01", periods=N, freq="min")
-    rows = zip(times, VALUES.tolist(), strict=True)
-    for row in (["zone"], ["Europe/Berlin"], ["time", "volts"], *rows):
-        book.active.append(row)
+def workbook(path, *sheets):
+    """A workbook with the rows of sheets."""
+    book = openpyxl.Workbook()
+    for number, rows in enumerate(sheets):
+        sheet = book.create_sheet() if number else book.active
+        for row in rows:
+            sheet.append(row)
     book.save(path)
-    with refused("--timezone Europe/Berlin"):
+    return path
+
+
+def test_a_sheet_is_read_with_its_dates_and_asks_for_the_zone_above_its_table(tmp_path, refused):
+    rows = zip(pd.to_datetime(MINUTES), VALUES, strict=True)
+    above = ["zone"], ["Europe/Berlin"], [], ["Zeit", "Spannung"]
+    path = workbook(tmp_path / "a.xlsx", [*above, *rows])
+    zone = "Europe/Berlin"
+    with refused(f"--timezone {zone}"):
         read(path)
-    assert read(path, timezone="Europe/Berlin").start == "2024-02-29T23:00:00+00:00"
+    (series,) = read_source(path, options=Cleaning(timezone=zone)).values()
+    assert (series.name, series.places.of(0)) == ("Spannung", "line 5")
+    telemetry = read(path, timezone=zone)
+    assert (telemetry.start, telemetry.interval_s) == ("2024-02-29T23:00:00+00:00", 60)
+    np.testing.assert_allclose(telemetry.values[:, 0], VALUES, rtol=1e-6)
+
+
+def test_a_first_sheet_without_numbers_is_named(tmp_path, refused):
+    path = workbook(tmp_path / "a.xlsx", [["v"], ["by hand"]], [["v"], [1.5]])
+    with refused("only the first sheet was read: Sheet"):
+        read_source(path)
 
 
 def test_texts_of_fixed_length_in_records_of_hdf5_are_times(tmp_path):
@@ -221,30 +240,25 @@ def parquet(path, **columns):
     return path
 
 
-def test_files_of_other_units_are_not_joined(tmp_path, refused):
+def test_files_of_other_units_or_zones_are_not_joined(tmp_path, refused):
     since = 1_709_251_200 + np.arange(N)
-    of_numbers = [
-        parquet(tmp_path / f"{unit}.parquet", time=factor * since)
-        for unit, factor in (("s", 1), ("ms", 1_000))
-    ]
-    with refused("'time' of different units"):
-        read(of_numbers)
-    with_attributes = [
-        with_attribute(tmp_path / f"{unit}.h5", "units", unit) for unit in ("s", "ms")
-    ]
-    with refused("'time' of different units", "s.h5 to ms.h5"):
-        read(with_attributes)
-
-
-def test_files_of_other_zones_are_not_joined(tmp_path, refused):
-    times = pd.date_range("2024", periods=N, freq="s")
-    with refused("'time' of different units", "a.parquet to b.parquet"):
-        read(
-            [
-                parquet(tmp_path / "a.parquet", time=times.tz_localize("UTC")),
-                parquet(tmp_path / "b.parquet", time=times),
-            ]
-        )
+    times = pd.to_datetime(since, unit="s")
+    for name, time in (
+        ("seconds", since),
+        ("milliseconds", 1_000 * since),
+        ("zoned", times.tz_localize("UTC")),
+        ("local", times),
+    ):
+        parquet(tmp_path / f"{name}.parquet", time=time)
+    for unit in ("s", "ms"):
+        with_attribute(tmp_path / f"{unit}.h5", "units", unit)
+    for first, second in (
+        ("seconds.parquet", "milliseconds.parquet"),
+        ("zoned.parquet", "local.parquet"),
+        ("s.h5", "ms.h5"),
+    ):
+        with refused("'time' of different units", f"{first} to {second}"):
+            read([tmp_path / first, tmp_path / second])
 
 
 def test_a_channel_without_values_in_one_file_is_joined(tmp_path):
@@ -263,9 +277,8 @@ def test_an_index_with_a_name_and_spans_of_arrow_are_clocks():
 
 
 def test_an_empty_sheet_and_numbered_names_that_exist_are_refused(tmp_path, refused):
-    openpyxl.Workbook().save(tmp_path / "a.xlsx")
     with refused("it is empty"):
-        read(tmp_path / "a.xlsx")
+        read(workbook(tmp_path / "a.xlsx", []))
     with refused("'v.1'"):
         read(pd.DataFrame(np.ones((9, 4)), columns=["time", "v", "v", "v.1"]))
 

@@ -649,6 +649,13 @@ REFUSED_TEXTS = {
         60,
     ),
     "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), "v.1, v.2"),
+    "names without an end": ("time,v", "rows below the header"),
+    "names without an end around a blank": ("time v", "rows below the header"),
+    "a name in quotes without an end": ('"time"', "rows below the header"),
+    "a damaged time of day that makes no elapsed times": (
+        table("date,clock,v", DAYS, [*CLOCK[:30], "99:59:59", *CLOCK[31:]], VALUES),
+        "'2024-03-01 99:59:59' at line 32",
+    ),
     "numbered sensors": (
         table("time,sensor_id,v", UTC.repeat(2), [7, 8] * N, 0.5 * np.arange(2 * N)),
         "--series-column sensor_id",
@@ -735,12 +742,6 @@ def test_a_part_of_a_time_that_is_out_of_range_loses_its_row_alone(part):
     )
 
 
-def test_a_damaged_time_of_day_makes_no_elapsed_times(written, refused):
-    cells = [*CLOCK[:30], "99:59:59", *CLOCK[31:]]
-    with refused("'2024-03-01 99:59:59' at line 32", "--drop-bad"):
-        read_source(written(table("date,clock,v", DAYS, cells, VALUES)))
-
-
 def test_lines_that_repeat_the_names_leave_no_gap(written):
     channels = read_source(written("a,b\n1.5,2\n2.5,x\na,b\n4.5,5\n5.5,y\n"))
     assert clean(channels["a"]).telemetry.values[:, 0].tolist() == [1.5, 2.5, 4.5, 5.5]
@@ -775,12 +776,6 @@ def test_samples_that_are_counted_are_not_said_to_need_an_interval():
     with pytest.raises(InputError, match="at least 2 in a row") as refused:
         clean(pd.Series([1.0, *[np.nan] * 9, 2.0, *[np.nan] * 9]))
     assert refused.value.options == ({"max_fill": 50},)
-
-
-def test_a_number_and_its_quality_in_one_cell_are_no_decimal(written):
-    series = one(written(table("time,air,v", MINUTES, ['"+0200,1"'] * N, VALUES)))
-    check(series)
-    assert series.name == "v"
 
 
 def test_units_that_change_from_row_to_row_tell_series_apart():
@@ -857,11 +852,6 @@ def test_several_series_in_one_table_are_told_apart(written, form):
     check(channels["a"])
     late = pd.Timedelta("30s" if form == "other times" else "0s")
     assert check(channels["b"], VALUES + 9, START + late).find("series").count == 2
-
-
-def test_a_state_is_no_key_of_series():
-    mode = np.where(ROWS % 20 < 10, "sun", "eclipse")
-    check(one(pd.DataFrame({"time": TIMES, "mode": mode, "v": VALUES})))
 
 
 def of_influxdb(*columns, above=""):
@@ -972,11 +962,12 @@ def test_a_label_may_be_named_or_refused_and_may_concern_one_channel():
     assert "state" in read_source(frame, options=Cleaning(label_column="none"))
 
 
-def test_quality_flags_and_counts_beside_a_clock_are_named_and_left_out():
-    frame = framed(v_quality=192, number=range(N))
+def test_quality_flags_counts_and_states_beside_a_clock_are_named_and_left_out():
+    frame = framed(v_quality=192, number=range(N), valve=["open"] * 20 + ["closed"] * 40)
     report = check(one(frame))
     assert "v_quality" in report.find("quality flags").text
     assert "number" in report.find("row numbers").text
+    assert "--states" in report.find("columns left out").text
 
 
 IS_FILLED = ROWS % 20 == 5
@@ -1165,6 +1156,18 @@ ORDINARY = {
         table("open_time,close_time,v", UTC, 1_709_254_799 + SECONDS, VALUES),
         ["v"],
     ),
+    "names that are numbers behind that of the clock": (
+        table("time,31.5,63", UTC, VALUES, VALUES),
+        ["31.5", "63"],
+    ),
+    "a number and its quality in one cell": (
+        table("time,air,v", MINUTES, ['"+0200,1"'] * N, VALUES),
+        ["v"],
+    ),
+    "a state that tells no series apart": (
+        framed(mode=np.where(ROWS % 20 < 10, "sun", "eclipse")),
+        ["v"],
+    ),
     "limits of channels above the names": (
         "".join(f"c{k},-10,10\n" for k in range(12)) + PLAIN,
         ["v"],
@@ -1210,16 +1213,13 @@ def test_an_ordinary_form_is_taken_for_no_odd_one(written, form):
     assert list(read_source(written(source) if isinstance(source, str) else source)) == names
 
 
-@pytest.mark.parametrize("text", ["time,v", "time v", '"time"'])
-def test_names_without_an_end_are_no_table(written, refused, text):
-    with refused("rows below the header"):
-        read_source(written(text))
-
-
-def test_the_hour_goes_before_that_in_which_an_interval_ends():
-    frame = {"date": HOURS.strftime("%Y-%m-%d"), "Hour Ending": HOURS.hour + 1, "hour": HOURS.hour}
-    channels = read_source(pd.DataFrame(frame | {"v": VALUES}))
-    assert clean(channels["v"]).telemetry.start == "2024-03-01T00:00:00+00:00"
+@pytest.mark.parametrize(
+    ("beside", "start"), [({}, "2024-03-01T01:00Z"), ({"hour": HOURS.hour}, START)]
+)
+def test_the_hour_in_which_an_interval_ends_is_one_of_its_day_where_no_other_is(beside, start):
+    ends = {"date": HOURS.strftime("%Y-%m-%d"), "Hour Ending": HOURS.hour + 1}
+    channels = read_source(pd.DataFrame(ends | beside | {"v": VALUES}))
+    check(channels["v"], start=start, interval_s=3600)
 
 
 def test_a_clock_that_begins_again_leaves_no_channel_as_an_option():
@@ -1249,17 +1249,6 @@ def test_series_of_words_beside_series_of_numbers_are_left_out():
     channels = read_source(frame)
     assert list(channels) == ["a"]
     assert "series without numbers: b" in check(channels["a"]).find("columns left out").text
-
-
-def test_hours_that_end_are_those_of_a_day_beside_its_date(written):
-    text = table("Date,Hour Ending,v", HOURS.strftime("%Y-%m-%d"), HOURS.hour + 1, VALUES)
-    check(one(written(text)), start="2024-03-01T01:00Z", interval_s=3600)
-
-
-def test_names_may_be_numbers_behind_that_of_the_clock(written):
-    channels = read_source(written(table("time,31.5,63", UTC, VALUES, 2 * VALUES)))
-    assert list(channels) == ["31.5", "63"]
-    check(channels["63"], 2 * VALUES)
 
 
 def test_rows_without_the_word_of_others_are_a_series():
@@ -1294,11 +1283,6 @@ def test_whole_numbers_that_differ_are_a_channel_where_no_column_has_a_name(writ
     numbers = np.random.default_rng(0).permutation(1_000)[:N]
     channels = read_source(written(table("", numbers, VALUES)), options=NO_HEADER)
     assert list(channels) == ["column 0", "column 1"]
-
-
-def test_a_note_says_how_states_beside_channels_are_read():
-    frame = framed(valve=["open"] * 20 + ["closed"] * 40)
-    assert "--states" in clean(one(frame)).report.find("columns left out").text
 
 
 def test_an_option_that_is_too_long_for_a_message_is_none(refused):

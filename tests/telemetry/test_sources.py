@@ -173,6 +173,8 @@ BAD = {
         "2 levels",
     ),
     "no array": ("a.npy", b"not an array", "a.npy"),
+    "an array of text": ("a.npy", np.array(["a", "b"]), "a.npy"),
+    "an array of records": ("a.npy", np.zeros(3, [("a", "f4")]), "a.npy"),
     "a column number too large": ("a.npy", np.zeros((3, 2)), "'2'", {"columns": ["2"]}),
     "a time of an array": ("a.npy", np.zeros(3), "'t'", {"time": "t"}),
 } | {case: ("a.csv", *others) for case, others in BAD_TABLES.items()}
