@@ -13,19 +13,17 @@ from enhsim_tf.coarse.runs import Runs
 from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.simulator.simulator import EnhancedSimulator
-from enhsim_tf.telemetry.series import Clock, Part
+from enhsim_tf.telemetry.series import Clock, Part, Telemetry
+from tests.fitted_simulators import START, recorded
 from tests.known_simulators import parts_of, unchanged
-
-START = "2024-01-01T00:00:00+00:00"
 
 
 def model(window=8, delay_s=0.0, interval_s=10.0):
     """A simulator of recorded runs: the telemetry is twice the coarse run, which was seen from 0 to
     0.75.
     """
-    nominal = parts_of(
-        (Part((np.arange(31, dtype=np.float32) / 40)[:, None]),), ("volts",), interval_s, START
-    )
+    seen = np.arange(31, dtype=np.float32) / 40
+    nominal = Telemetry.of(seen, interval_s, start=START, name="volts")
     noise = WindowBootstrap(0.1 * np.random.default_rng(0).standard_normal((50, window, 1)))
     runs = Runs(nominal, ["celsius"], window, delay_s)
     return EnhancedSimulator(runs, unchanged(window, 1, 2.0), noise, ("celsius",), interval_s)
@@ -43,11 +41,12 @@ def run(**carried):
     return parts_of(tuple(parts), ("volts",), 10.0, START, "fault.csv")
 
 
-def test_every_row_has_its_time_and_labels(tmp_path):
-    assert write_copies(tmp_path / "out.parquet", model(), run(), 3, seed=1) == 96
+def test_every_row_has_its_labels_and_the_time_of_the_telemetry(tmp_path):
+    assert write_copies(tmp_path / "out.parquet", model(delay_s=25.0), run(), 3, seed=1) == 96
     frame = pd.read_parquet(tmp_path / "out.parquet")
     assert list(frame.columns) == ["copy", "time", "value", "out_of_range", "scenario", "severity"]
-    places = ((frame["time"] - pd.Timestamp(START)).dt.total_seconds() / 10).round().astype(int)
+    seconds = (frame["time"] - pd.Timestamp(START)).dt.total_seconds()
+    places = ((seconds - 25) / 10).to_numpy()
     assert places.tolist() == [*range(20), *range(40, 52)] * 3
     assert frame["copy"].tolist() == np.repeat(range(3), 32).tolist()
     assert (frame["scenario"] == np.where(places < 45, "nominal", "leak")).all()
@@ -77,12 +76,6 @@ def test_carried_columns_never_replace_ours_nor_those_of_channels(tmp_path):
     assert (frame["volts (run)"] == -999).all()
     np.testing.assert_allclose(frame["volts"], 2 * frame["copy (channel)"], atol=1e-6)
     np.testing.assert_allclose(frame["copy (channel)"][:20], np.arange(20) / 40, atol=1e-6)
-
-
-def test_times_are_those_of_the_telemetry(tmp_path):
-    write_copies(tmp_path / "out.parquet", model(delay_s=25.0), run(), 1)
-    first = pd.read_parquet(tmp_path / "out.parquet")["time"].iloc[0]
-    assert first == pd.Timestamp(START) + pd.Timedelta("25s")
 
 
 def test_a_clock_from_zero_is_in_seconds_and_a_mask_of_ones_is_boolean(tmp_path):
@@ -137,5 +130,4 @@ def test_the_lines_say_what_is_covered_and_what_is_left_out():
     # 20 of 32 samples; 20 of 25
     assert "covers 62.5% of the run (nominal 80.0%, leak 0.0%)" in lines[0]
     assert "5 of 37 samples" in lines[-1] and "shorter than a window of 8" in lines[-1]
-    still = parts_of((Part(np.full((20, 1), 3, np.float32)),), ("volts",), 10.0, START)
-    assert "extrapolation" in coverage_lines(model(), still)[0]
+    assert "extrapolation" in coverage_lines(model(), recorded(np.full(20, 3)))[0]

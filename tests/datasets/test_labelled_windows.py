@@ -83,14 +83,6 @@ def test_a_shard_depends_only_on_plan_and_number(tmp_path):
         assert PlainMaker(plan(230, 50, **changed), folders[2])(3) != forth[3]
 
 
-def test_one_file_has_the_windows_of_the_shards_one_after_the_other(tmp_path):
-    some = plan(230, 50)
-    for shard in range(5):
-        PlainMaker(some, tmp_path)(shard)
-    shards = pd.read_parquet(sorted(tmp_path.iterdir()))
-    pd.testing.assert_frame_equal(written(tmp_path / "x", some, plain()), shards)
-
-
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(
     st.lists(st.integers(0, 20), min_size=1, max_size=8).filter(any),

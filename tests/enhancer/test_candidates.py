@@ -47,21 +47,13 @@ def test_blocks_cover_the_time_and_are_held_out_in_turn():
     # 900 samples, three windows of 50 in each block
     assert edges.tolist() == [100, 250, 400, 550, 700, 850, 1_000]
     starts = np.arange(100, 951)
-    held = [split_fold(starts, 50, edges, fold)[1] for fold in range(3)]
+    learnt, held = zip(*(split_fold(starts, 50, edges, fold) for fold in range(3)), strict=True)
     assert sorted({int(starts[row]) for row in held[0]}) == [*range(100, 201), *range(550, 651)]
     assert not set(held[0]) & set(held[1]) and not set(held[1]) & set(held[2])
+    for training, held_out in zip(learnt, held, strict=True):  # they share no sample
+        assert np.abs(starts[training][:, None] - starts[held_out]).min() == 50
     with pytest.raises(InputError, match="windows of 50 samples"):
         block_edges(0, 149, window=50)
-
-
-def test_training_windows_share_no_sample_with_held_out_windows():
-    starts = np.random.default_rng(0).integers(0, 900, 300)
-    edges = block_edges(0, 950, window=50)
-    for fold in range(3):
-        learnt, held_out = split_fold(starts, 50, edges, fold)
-        assert len(learnt) and len(held_out)
-        apart = np.abs(starts[learnt][:, None] - starts[held_out])
-        assert apart.min() >= 50
 
 
 # one candidate
@@ -77,9 +69,7 @@ def test_the_coarse_candidate_returns_the_most_similar_column_of_each_channel_un
 
 def test_level_and_gain_are_those_of_least_squares():
     coarse = series()
-    target = np.stack([7 - 0.5 * coarse[:, 0], 3 * coarse[:, 1] - 1], axis=1) + noise(
-        (len(coarse), 2), 0.05
-    )
+    target = coarse * [-0.5, 3] + [7, -1] + noise((len(coarse), 2), 0.05)
     inputs, targets, starts = windows_of(coarse, target)
     predicted = Training(inputs, targets, starts).fit(LEVEL_AND_GAIN).predict(inputs)
     for channel in range(2):
@@ -92,9 +82,8 @@ def test_level_and_gain_are_those_of_least_squares():
 @pytest.mark.usefixtures("narrow_enhancer")
 def test_the_papers_network_takes_all_columns_and_learns():
     coarse = series(width=60)
-    inputs, targets, starts = windows_of(
-        coarse, np.stack([coarse[:, 0] + coarse[:, 1], 5 - 9 * coarse[:, 0]], axis=1)
-    )
+    target = coarse @ [[1, -9], [1, 0]] + [0, 5]
+    inputs, targets, starts = windows_of(coarse, target)
     found = Training(inputs, targets, starts).fit(NETWORK, epochs=6)
     errors = np.sqrt(np.mean((found.predict(inputs) - targets) ** 2, axis=(0, 1)))
     # of the first channel, one coarse column alone leaves 0.7
@@ -103,9 +92,8 @@ def test_the_papers_network_takes_all_columns_and_learns():
 
 def test_random_features_are_ridge_regression_on_a_hidden_layer_of_relu():
     coarse = series(800)
-    inputs, targets, starts = windows_of(
-        coarse, np.stack([coarse[:, 0] ** 2, 4 * np.abs(coarse[:, 1])], axis=1), 60
-    )
+    target = np.column_stack([coarse[:, 0] ** 2, 4 * np.abs(coarse[:, 1])])
+    inputs, targets, starts = windows_of(coarse, target, 60)
     alone, both = (
         Training(inputs, targets, starts).fit(name) for name in (RIDGE, RIDGE_AND_FEATURES)
     )
@@ -142,9 +130,8 @@ def test_the_sum_of_factors_and_layers_by_hand():
 
 def test_the_choice_does_not_depend_on_units():
     coarse = series()
-    target = np.stack(
-        [0.7 * coarse[:, 0] + 0.4 * np.roll(coarse[:, 1], 1), coarse[:, 1]], axis=1
-    ) + noise((len(coarse), 2), 0.05)
+    first = 0.7 * coarse[:, 0] + 0.4 * np.roll(coarse[:, 1], 1)
+    target = np.column_stack([first, coarse[:, 1]]) + noise((len(coarse), 2), 0.05)
     one = choose_enhancer(*windows_of(coarse, target))
     other = choose_enhancer(
         *windows_of(coarse * [1e-4, 1e4] + [3.0, 1e5], target * [1e3, 1e-3] - [5e3, 2.0])

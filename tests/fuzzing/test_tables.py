@@ -25,13 +25,8 @@ def use(source):
     def channels(cleaning):
         for series in read_source(source, options=cleaning).values():
             cleaned = clean(series, cleaning)
-            assert all(
-                line.isprintable()
-                for line in (
-                    *cleaned.report.lines(),
-                    json.dumps(cleaned.report.to_dict(), allow_nan=False),
-                )
-            )
+            record = json.dumps(cleaned.report.to_dict(), allow_nan=False)
+            assert all(line.isprintable() for line in (*cleaned.report.lines(), record))
             assert all(np.isfinite(part.values).all() and len(part) for part in cleaned.parts)
 
     all_of(lambda: channels(Cleaning()), lambda: channels(Cleaning(interval_s=1.0, drop_bad=True)))
@@ -127,8 +122,6 @@ def npy_seeds():
         WAVE > 0,
         WAVE + 0j,
         np.array([None, "a"]),
-    ]
-    arrays += [
         np.arange(NUM).astype("datetime64[s]"),
         np.zeros(3, [("a", "f4")]),
         np.zeros((2, 3, 4)),
