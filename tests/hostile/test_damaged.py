@@ -32,6 +32,13 @@ def half(content):
     return content[: len(content) // 2]
 
 
+def sign(model):
+    """Writes the checksums of a model's files as they are now."""
+    manifest = json.loads((model / "manifest.json").read_text())
+    manifest["sha256"] = {name: sha256(model / name) for name in manifest["sha256"]}
+    (model / "manifest.json").write_text(json.dumps(manifest))
+
+
 MODELS = {
     "arrays cut off": ("arrays.npz", half, "missing or damaged file"),
     "settings by hand": (
@@ -67,6 +74,15 @@ def test_a_damaged_model_is_refused(model, refused, damage):
 def test_a_model_without_one_of_its_files_is_refused(model, refused, name):
     (model / name).unlink()
     with refused("model"):
+        EnhancedSimulator.load(model)
+
+
+def test_a_model_with_a_part_that_this_version_does_not_know_is_refused(model, refused):
+    rewrite(
+        model / "settings.json", lambda content: content.replace(b"WindowBootstrap", b"PinkNoise")
+    )
+    sign(model)
+    with refused("'PinkNoise'", "Fit it again"):
         EnhancedSimulator.load(model)
 
 
@@ -128,9 +144,7 @@ def test_pickled_objects_do_not_run(model, tmp_path, refused):
             read_source(tmp_path / name)
     with np.load(model / "arrays.npz") as arrays:
         np.savez(model / "arrays.npz", **dict(arrays) | {"levels": objects})
-    manifest = json.loads((model / "manifest.json").read_text())
-    manifest["sha256"]["arrays.npz"] = sha256(model / "arrays.npz")
-    (model / "manifest.json").write_text(json.dumps(manifest))
+    sign(model)
     with pytest.raises(ValueError, match="allow_pickle"):
         EnhancedSimulator.load(model)
     assert not os.path.exists(ran)
