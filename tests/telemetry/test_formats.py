@@ -225,6 +225,21 @@ def test_signals_of_a_simulation_are_read_with_their_time(tmp_path):
         check(telemetry)
 
 
+def test_each_of_many_runs_in_an_array_of_structs_is_a_table(tmp_path, refused):
+    runs = np.empty(2, object)
+    data = FRAME.assign(time=SECONDS)
+    runs[:] = [
+        {"kind": "charge", "data": {name: data[name].to_numpy() for name in data}},
+        {"kind": "rest", "data": {"time": SECONDS, "volts": -VALUES}},
+    ]
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"log": {"run": runs}})
+    with refused("--table log.run.1.data", "--table log.run.2.data"):
+        read(path)
+    check(read(path, table="log.run.1.data"))
+    np.testing.assert_allclose(read(path, table="log.run.2.data").values[:, 0], -VALUES, rtol=1e-6)
+
+
 def test_tables_of_equal_names_in_two_groups_are_both_offered(tmp_path, refused):
     path = hdf5(tmp_path / "a.h5", one=FRAME, two=FRAME)
     with h5py.File(path, "r+") as file:

@@ -8,7 +8,7 @@ import dataclasses
 import io
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -248,26 +248,39 @@ def read_matlab(content: bytes, name: str, options: Cleaning) -> Table:
     arrays = {}
     for key, value in variables.items():
         if isinstance(value, dict):
-            arrays |= {(key, field): inside for field, inside in _fields_of(value).items()}
+            arrays |= _fields_of(value, key)
         elif not key.startswith("__"):
             arrays["", key] = np.asarray(value)
     return _of_arrays(arrays, name, options)
 
 
-def _fields_of(struct: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Returns the arrays of a struct and of the structs in it, such as the signals of Simulink's
-    structure with time, by their names.
+def _fields_of(
+    struct: Mapping[str, Any], group: str, path: str = "", outside: Collection[int] = ()
+) -> dict[tuple[str, str], np.ndarray]:
+    """Returns the arrays of a struct and of the structs in it, by their group and name. The signals
+    of Simulink's structure with time belong to it; a struct with several arrays of a length that
+    occurs nowhere outside of it, such as one of many runs, is a group of its own.
     """
-    fields: dict[str, np.ndarray] = {}
+    fields: dict[tuple[str, str], np.ndarray] = {}
+    structs: dict[str, Mapping[str, Any]] = {}
     for key, value in struct.items():
-        several = isinstance(value, np.ndarray | list) and all(isinstance(x, dict) for x in value)
         if isinstance(value, dict):
-            fields |= {f"{key}.{name}": inside for name, inside in _fields_of(value).items()}
-        elif several:
-            numbered = {f"{key}.{number}": inside for number, inside in enumerate(value, 1)}
-            fields |= _fields_of(numbered)
+            structs[f"{path}{key}"] = value
+        elif isinstance(value, np.ndarray | list) and all(isinstance(x, dict) for x in value):
+            structs |= {f"{path}{key}.{number}": each for number, each in enumerate(value, 1)}
         else:
-            fields[key] = np.asarray(value)
+            fields[group, f"{path}{key}"] = np.asarray(value)
+    outside = {1, *outside, *(each.size for each in fields.values())}
+    for name, each in structs.items():
+        own = f"{group}.{name}"
+        inside = _fields_of(each, own, outside=outside)
+        sizes = [
+            values.size
+            for (owner, _), values in inside.items()
+            if owner == own and values.size not in outside
+        ]
+        is_group = len(set(sizes)) < len(sizes)
+        fields |= inside if is_group else _fields_of(each, group, f"{name}.", outside)
     return fields
 
 
