@@ -18,11 +18,11 @@ from enhsim_tf.telemetry.series import iso_time
 _ACTIONS = {
     "accepted": (
         "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, "
-        "own columns, series, columns left out, commands, decimal comma, units, fill values, "
+        "own columns, series, columns left out, commands, decimal comma, units, "
         "missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level, "
         "counter, states"
     ),
-    "WARNING": "mostly filled",
+    "WARNING": "mostly filled, fill values",
     "repaired": "unsorted, other rates, jitter, gaps filled",
     "left out": (
         "ragged lines, padding, missing times, bad times, clock change, duplicate rows, same time, "
