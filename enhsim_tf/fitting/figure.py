@@ -25,18 +25,13 @@ def report_figure(report: Report) -> matplotlib.figure.Figure:
     generated telemetry.
     """
     shown = report.channels[:MOST_CHANNELS]
-    first = report.nrmse[shown[0]]
     rows = len(shown)
-    nearer = 1 - first.enhanced / first.coarse if first.coarse > 0 else 0.0
-    message = f"{drawable(shown[0], 30)}: " + (
-        f"enhanced {nearer:.0%} nearer to the telemetry than coarse"
-        if nearer > 0
-        else "enhancing brings the coarse signal no nearer"
-    )
     where = "held-out telemetry" if report.is_held_out else "the telemetry of the fit"
     subtitle = f"Measured on {where}; noise: {report.noise_model}."
-    figure, down = new_sheet(DOUBLE, 0.9 + 1.77 * rows, message, subtitle)
-    grid = panels(figure, down + 0.24, rows, 2, gap=(0.62, 0.6), sharey="row")
+    if rows < len(report.channels):
+        subtitle += f" Drawn: the first {rows} of {len(report.channels):,} channels."
+    figure, down = new_sheet(DOUBLE, 1.05 + 1.45 * rows, _message(report), subtitle)
+    grid = panels(figure, down + 0.24, rows, 2, gap=(0.3, 0.6), sharey="row")
     for row, name in enumerate(shown):
         curves = {kind: values[:, row] for kind, values in report.examples.items()}
         signal, made = grid[row]
@@ -48,8 +43,26 @@ def report_figure(report: Report) -> matplotlib.figure.Figure:
             axes.locator_params(axis="y", nbins=4)
             axes.ticklabel_format(axis="y", useOffset=False)
             axes.set_xlabel("sample" if row == len(shown) - 1 else "")
-        signal.set_ylabel(drawable(name, 14), parse_math=False)
+        signal.set_ylabel(drawable(name, 20), parse_math=False)
     title_words(grid[0, 0], [("real", REAL), ("coarse (dashed)", COARSE), ("enhanced", ENHANCED)])
     title_words(grid[0, 1], [("generated", GENERATED)])
     foot(figure, f"enhsim-tf fit · windows of {report.window:,} samples")
     return figure
+
+
+def _message(report: Report) -> str:
+    """What the figure shows: how much nearer the enhanced signal is, or in how many channels."""
+    nearer = {
+        name: 1 - error.enhanced / error.coarse
+        for name, error in report.nrmse.items()
+        if error.enhanced < error.coarse
+    }
+    if len(report.channels) > 1:
+        of_all = f"{len(nearer):,} of {len(report.channels):,} channels"
+        return f"Enhanced is nearer to the telemetry than coarse in {of_all}"
+    (name,) = report.channels
+    if nearer:
+        said = f"enhanced {nearer[name]:.0%} nearer to the telemetry than coarse"
+    else:
+        said = "enhancing brings the coarse signal no nearer"
+    return f"{drawable(name, 30)}: {said}"
