@@ -22,7 +22,7 @@ def series_index(num_samples: int, interval_s: float, start: str | pd.Timestamp 
     """
     seconds = np.arange(num_samples) * interval_s
     if start is None:
-        return pd.Index(seconds, name="time_s")
+        return pd.Index(np.round(seconds, 9), name="time_s")
     return Clock(interval_s, parse_start(start).value, DATES).index(seconds)
 
 

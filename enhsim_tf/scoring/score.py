@@ -281,7 +281,7 @@ def events_table(scored: ScoredTelemetry) -> pd.DataFrame:
     told = {name: told_times(at, scored.clock) for name, at in times.items()}
     texts = {name: table[name].map(", ".join) for name in ("views", "channels")}
     table = table.assign(**told, **texts)
-    table.insert(4, "duration_s", (end - begin) * interval_s)
+    table.insert(4, "duration_s", np.round((end - begin) * interval_s, 9))
     return table
 
 
