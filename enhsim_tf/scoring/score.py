@@ -80,7 +80,8 @@ class ScoredTelemetry:
         if not lasting:
             return ""
         when = told_times(self.table.index[[lasting[-1].begin]], self.clock)[0]
-        when = f"{when:.10g} s" if isinstance(when, float) else when
+        if not hasattr(when, "tz"):
+            when = f"{when:.10g} s" if self.clock.counts else f"sample {when:,}"
         return (
             f"1 lasting departure since {when}: the telemetry has left what was learnt and stays "
             f"there ({', '.join(lasting[-1].views)}). It is a lasting fault, or the new normal: "
