@@ -255,7 +255,7 @@ def read_matlab(content: bytes, name: str, options: Cleaning) -> Table:
 
 
 def _fields_of(
-    struct: Mapping[str, Any], group: str, path: str = "", outside: Collection[int] = ()
+    struct: Mapping[str, Any], group: str, outside: Collection[int] = ()
 ) -> dict[tuple[str, str], np.ndarray]:
     """Returns the arrays of a struct and of the structs in it, by their group and name. The signals
     of Simulink's structure with time belong to it; a struct with several arrays of a length that
@@ -265,22 +265,26 @@ def _fields_of(
     structs: dict[str, Mapping[str, Any]] = {}
     for key, value in struct.items():
         if isinstance(value, dict):
-            structs[f"{path}{key}"] = value
+            structs[key] = value
         elif isinstance(value, np.ndarray | list) and all(isinstance(x, dict) for x in value):
-            structs |= {f"{path}{key}.{number}": each for number, each in enumerate(value, 1)}
+            structs |= {f"{key}.{number}": each for number, each in enumerate(value, 1)}
         else:
-            fields[group, f"{path}{key}"] = np.asarray(value)
+            fields[group, key] = np.asarray(value)
     outside = {1, *outside, *(each.size for each in fields.values())}
     for name, each in structs.items():
         own = f"{group}.{name}"
-        inside = _fields_of(each, own, outside=outside)
+        inside = _fields_of(each, own, outside)
         sizes = [
             values.size
             for (owner, _), values in inside.items()
             if owner == own and values.size not in outside
         ]
-        is_group = len(set(sizes)) < len(sizes)
-        fields |= inside if is_group else _fields_of(each, group, f"{name}.", outside)
+        if len(set(sizes)) == len(sizes):
+            inside = {
+                (group, f"{name}.{field}") if owner == own else (owner, field): values
+                for (owner, field), values in inside.items()
+            }
+        fields |= inside
     return fields
 
 
