@@ -71,7 +71,7 @@ def choose_coarse(
             f"{LEAST_LEARNT} windows of half the period of its best square wave, {period:.0f} "
             f"samples, do not fit into {len(values):,} samples"
         )
-    wanted = window or max(FEWEST_SAMPLES, min(default_window(len(values)), usual))
+    wanted = window or min(default_window(len(values)), usual)
     fitting = longest_window(parts, wanted, wanted if window else FEWEST_SAMPLES, LEAST_LEARNT)
     if not fitting:
         raise too_short(window or FEWEST_SAMPLES, name, parts)
@@ -87,9 +87,12 @@ def choose_coarse(
 
 
 def usual_length(parts: Sequence[Sized]) -> int:
-    """Returns the length that parts with half of all samples have at least."""
+    """Returns the length that parts with half of all samples have at least, but no less than the
+    fewest samples of a window.
+    """
     lengths = np.sort([len(part) for part in parts])[::-1]
-    return int(lengths[np.searchsorted(np.cumsum(lengths), lengths.sum() / 2)])
+    usual = lengths[np.searchsorted(np.cumsum(lengths), lengths.sum() / 2)]
+    return max(FEWEST_SAMPLES, int(usual))
 
 
 def on_short_parts(telemetry: Telemetry, window: int) -> list[str]:

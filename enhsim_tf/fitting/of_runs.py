@@ -14,7 +14,7 @@ from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, Training, choose_en
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.fitting.coarse_choice import on_short_parts, too_short, usual_length
 from enhsim_tf.fitting.fitted import Fitted, num_training_windows
-from enhsim_tf.fitting.options import FEWEST_SAMPLES, LEAST_LEARNT, FitOptions, default_window
+from enhsim_tf.fitting.options import LEAST_LEARNT, FitOptions, default_window
 from enhsim_tf.noise.registry import RESIDUAL_WINDOWS
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut, evenly_spaced_starts, times_of, windows_of
@@ -42,8 +42,8 @@ def fit_runs(
     is_given = options.delay_s is not None
     delay = Delay(options.delay_s) if is_given else _delay_of(recording, run, guess)
     paired, run_there = pair_recordings(recording, run, delay.seconds, 2)
-    most = max(FEWEST_SAMPLES, usual_length(paired.parts))
-    window = options.window or min(default_window((1 - options.held_out) * len(paired)), most)
+    wanted = default_window((1 - options.held_out) * len(paired))
+    window = options.window or min(wanted, usual_length(paired.parts))
     notes.append(_on_delay(delay, recording, is_given))
     if len(paired) < len(recording):
         notes.append(
