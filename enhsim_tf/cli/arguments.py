@@ -320,8 +320,8 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     table = parser.add_argument_group(
         "tables in other forms", "what is detected unless it is given (docs/forms.md)"
     )
-    names = "label_column", "series_column", "no_header", "skip_rows", "table", "states", "decimal"
-    add_options(table, Cleaning, *names)
+    names = "label_column", "series_column", "part_column", "no_header", "skip_rows", "table"
+    add_options(table, Cleaning, *names, "states", "decimal")
     _add_cleaning(parser)
 
 

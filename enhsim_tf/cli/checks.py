@@ -44,6 +44,8 @@ def check(options: argparse.Namespace) -> argparse.Namespace:
         least = {"fit": getattr(options, "window", None) or 32, "inject": 3}.get(command, 2)
         labelled = "missing" if command in ("fit", "update") else "keep"
         options.cleaning = cleaning_options(options, least, labelled)
+    if hasattr(options, "source") and getattr(options, "coarse", None) is not None:
+        _refuse(options, "with --coarse, whose run is one part", "part_column")
     for source in (getattr(options, "source", None), getattr(options, "coarse", None)):
         if source is not None:
             existing(source)

@@ -484,6 +484,7 @@ WRONG = {  # a command, and what its error says
     f"{FIT} --held-out 20": "(--held-out)",
     f"{FIT} --window 2000": "--window",
     f"{FIT} --delay 3": "--delay without --coarse",
+    f"{FIT} --coarse WORLD/one.csv --part-column time": "--part-column with --coarse",
     GENERATE: "--windows",
     f"{GENERATE} --workers 1": "--windows",
     f"{GENERATE} --windows 0": "--windows 0",

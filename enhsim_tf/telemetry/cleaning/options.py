@@ -29,6 +29,8 @@ DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_52
 """Kinds of days and their number of 1970-01-01: spreadsheets, modified Julian dates, Julian dates,
 MATLAB.
 """
+FILE = "file"
+"""Instead of a column that tells parts apart: each file is a part."""
 _MAX_FILL = {"linear": 5, "hold": 1_000_000}
 _LISTS = ("label_column", "series_column", "missing_values")  # one, or several
 
@@ -64,6 +66,8 @@ class Cleaning:
             as "missing".
         series_column: Name, or names, of the columns whose values tell several series of one table
             apart, or "none". None: detected.
+        part_column: Name of the column whose values tell parts of one series apart that each count
+            from zero, such as repeated tests, or "file": each file is a part. None: one part.
         no_header: Whether a text file has no line of column names. Its columns are then called
             "column 0", "column 1", ...
         skip_rows: Number of lines of a text file, or rows of a sheet, that are left out on top.
@@ -136,6 +140,12 @@ class Cleaning:
         metavar="NAME",
         repeated=True,
     )
+    part_column: str | None = option(
+        None,
+        "column whose values tell repeated tests apart that each count from zero, or 'file'",
+        str,
+        metavar="NAME",
+    )
     no_header: bool = option(
         False, "the file has no line of names: columns are 'column 0', 'column 1', ...", bool
     )
@@ -173,5 +183,5 @@ class Cleaning:
         further changes of fields.
         """
         own = {"time_format": None, "label_column": None, "labelled": "keep", "series_column": None}
-        own |= {"no_header": False, "skip_rows": 0, "table": None}
+        own |= {"part_column": None, "no_header": False, "skip_rows": 0, "table": None}
         return dataclasses.replace(self, **own | changes)

@@ -18,7 +18,7 @@ from enhsim_tf.telemetry.series import iso_time
 _ACTIONS = {
     "accepted": (
         "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, "
-        "own columns, series, columns left out, commands, decimal comma, units, "
+        "own columns, series, parts, columns left out, commands, decimal comma, units, "
         "missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level, "
         "counter, states"
     ),

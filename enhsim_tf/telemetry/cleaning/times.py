@@ -37,7 +37,7 @@ _DAY_NAMES = {
 _YEARS_S = (3.1e8, 3.4e9)
 _DAY_NUMBERS = ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))  # of 1954 to 2119
 _RANGE = pd.Timestamp(1678, 1, 1), pd.Timestamp(2262, 1, 1)
-_LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
+LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
 DURATION = (
     r"[+-]?\d+(?:\.\d+)? ?"
     r"(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
@@ -203,7 +203,7 @@ class _Reader:
             times = pd.Series(values)
             unit = "s"
         factor = UNITS_NS[unit]
-        bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
+        bad = ~np.isnan(values) & ~(np.abs(values) < LARGEST_NS / factor)
         self.refuse(times, bad)
         usable = finite & ~bad
         since = np.full(len(values), pd.NaT.value, np.int64)
@@ -382,7 +382,7 @@ def _infer_unit(values: np.ndarray, what: str) -> str:
         [
             {"time_format": form}
             for form in ("ms", "us", "ns", "s")
-            if size * UNITS_NS[form] < _LARGEST_NS
+            if size * UNITS_NS[form] < LARGEST_NS
         ],
         "the times as dates, if they count from 1601 or 1904",
     )

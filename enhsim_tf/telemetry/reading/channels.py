@@ -19,7 +19,7 @@ from enhsim_tf.telemetry.cleaning.numbers import (
     is_missing,
     is_text,
 )
-from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.cleaning.options import FILE, Cleaning
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.cleaning.times import jumps_back
@@ -27,6 +27,7 @@ from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.reading.column_names import words_of
 from enhsim_tf.telemetry.reading.columns import Layout, anomalous, lay_out
 from enhsim_tf.telemetry.reading.files import read_table
+from enhsim_tf.telemetry.reading.repeated_parts import files_of_rows
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _SAID = {
@@ -92,7 +93,7 @@ def read_table_channels(
             "other names",
         )
     keys = [key for key in _keys_of(layout, options) if key not in (named or ())]
-    findings = list(table.findings)
+    findings = list(layout.findings)
     for kind, text in _SAID.items():
         used = (*keys, *(layout.words if options.states else ()))
         if names := [name for name in layout.left_out.get(kind, ()) if name not in used]:
@@ -207,20 +208,22 @@ def _with_states(
 
 def _refuse_parallel_files(layout: Layout) -> None:
     """Refuses files over the same times, which are no parts of one series."""
-    files = layout.places.files
-    if len({name for _, _, name in files}) < 2 or layout.times is None:
+    if layout.times is None:
         return
     stamps = pd.Series(layout.times.stamps)
-    starts = [row for row, _, _ in files]
-    file = np.searchsorted(starts, stamps.index, "right") - 1
+    file, names = files_of_rows(layout.places, len(stamps))
+    if len(names) < 2:
+        return
     spans = stamps.groupby(file).agg(["min", "max"]).dropna().sort_values(["min", "max"])
     for one, other in itertools.pairwise(spans.itertuples()):
         shorter = min(one.max - one.min, other.max - other.min)
         if min(one.max, other.max) - other.min > shorter / 2:
-            first, second = (files[span.Index][2] for span in (one, other))
+            first, second = (names[span.Index] for span in (one, other))
             raise InputError(
                 f"Expected files whose times follow each other. Received: {first} and {second} "
-                f"over the same times, in {layout.what}. Give them one by one."
+                f"over the same times, in {layout.what}.",
+                [{"part_column": FILE}] if layout.times.counts else (),
+                "them one by one",
             )
 
 
@@ -251,7 +254,9 @@ def _with_different_names(
         )
     times = () if time is None else (time,)
     asked = [name for name in columns or () if name in repeated]
-    for name in [*asked, *(options.label_column or ()), *(options.series_column or ()), *times]:
+    parts = {options.part_column} - {None, FILE}
+    asked += [*(options.label_column or ()), *(options.series_column or ()), *parts, *times]
+    for name in asked:
         if name not in names and name != NO_TIME:
             raise InputError(
                 f"Expected a column of {table.what}: {', '.join(names[:8])}. Received: {name!r}. "

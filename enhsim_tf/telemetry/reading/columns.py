@@ -24,6 +24,7 @@ from enhsim_tf.telemetry.reading.clock_parts import Clock
 from enhsim_tf.telemetry.reading.clock_values import is_epoch
 from enhsim_tf.telemetry.reading.column_names import is_unnamed, words_of
 from enhsim_tf.telemetry.reading.contents import Contents, contents_of
+from enhsim_tf.telemetry.reading.repeated_parts import one_after_another, refuse_restarts
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set(
@@ -104,8 +105,13 @@ def lay_out(
         _take(roles, {"columns left out": [name for name in kinds if name not in channels]})
     left_out: dict[str, list[str]] = {}
     for name in kinds:
-        if roles.get(name, "") not in ("", "clock", "series"):
+        if roles.get(name, "") not in ("", "clock", "series", "parts"):
             left_out.setdefault(roles[name], []).append(name)
+    if options.part_column is not None:
+        times, said = one_after_another(table, times, options)
+        table = dataclasses.replace(table, findings=(*table.findings, said))
+    elif options.series_column is None:
+        refuse_restarts(contents, left_out.get("row numbers", ()) if time is None else (), times)
     return Layout(
         **vars(table),
         clock=clock,
@@ -135,6 +141,7 @@ def _roles_without_clock(
     return {
         "labels": _labels_of(contents, asked, options),
         "series": options.series_column or (),
+        "parts": names & {options.part_column},
         "own columns": _OWN & names if is_written else (),
         "quality flags": [
             name

@@ -1,0 +1,106 @@
+"""Parts of one series that each count from zero, as repeated tests, cycles of a cell and engines of
+a fleet do: in one table, told apart by a column, or in a file each.
+"""
+
+from collections.abc import Collection
+
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError, counted
+from enhsim_tf.telemetry.cleaning.options import FILE, Cleaning
+from enhsim_tf.telemetry.cleaning.report import Finding, Places
+from enhsim_tf.telemetry.cleaning.times import LARGEST_NS, Times
+from enhsim_tf.telemetry.reading.contents import Contents
+
+
+def files_of_rows(places: Places, num_rows: int) -> tuple[np.ndarray, list[str]]:
+    """Returns the number of the file of each row, counted from 0, and the names of the files."""
+    begins: list[int] = []
+    names: list[str] = []
+    last = 0
+    for row, line, name in places.files:
+        # a header that is repeated inside of a file begins no other
+        if not names or name != names[-1] or line <= last:
+            begins.append(row)
+            names.append(name)
+        last = line
+    return np.searchsorted(begins, np.arange(num_rows), "right") - 1, names
+
+
+def one_after_another(
+    table: Contents, times: Times | None, options: Cleaning
+) -> tuple[Times, Finding]:
+    """Places the parts that `options.part_column` tells apart one after another, each a power of
+    ten seconds behind the one before it, and says so.
+
+    Raises:
+        InputError: If there is no clock that counts.
+    """
+    column = str(options.part_column)
+    if times is None or not times.counts:
+        what = "no clock" if times is None else times.form
+        raise InputError(
+            f"Expected times that count in each part with part_column (--part-column). Received: "
+            f"{what} in {table.what}.",
+            otherwise="the column that counts with --time, or leave it out: gaps split a series",
+        )
+    if column == FILE and FILE not in table.frame:
+        number, _ = files_of_rows(table.places, len(table.frame))
+    else:
+        number = table.frame.groupby(column, sort=False, dropna=False).ngroup().to_numpy()
+    own_s = times.seconds
+    own_s = own_s[np.isfinite(own_s)]
+    step_s = np.median(np.abs(np.diff(own_s))) if len(own_s) > 1 else 0.0
+    # further apart than a gap that is filled
+    reach_s = np.ptp(np.append(own_s, 0.0)) + (options.longest_gap + 2) * step_s
+    apart_s = 10 ** int(np.ceil(np.log10(max(reach_s, 1.0))))
+    last = int(number.max(initial=0))
+    if (last * apart_s + reach_s) * 1e9 > LARGEST_NS:
+        raise InputError(
+            f"Expected parts that fit into 292 years one after another. Received: {last + 1:,} by "
+            f"{column!r} in {table.what}, every {apart_s:,} s. Give fewer of them."
+        )
+    stamps = times.stamps + pd.to_timedelta(number * apart_s, unit="s")
+    text = (
+        f"parts told apart by {column}: {last + 1:,}, placed one after another, every {apart_s:,} s"
+    )
+    placed = Times(stamps, times.bad, times.form, times.zone, times.counts)
+    return placed, Finding("parts", last + 1, text)
+
+
+def refuse_restarts(table: Contents, counters: Collection[str], times: Times | None) -> None:
+    """Refuses times, or `counters` of rows beside no clock, that begin again with each value of
+    another column of numbers.
+    """
+    if times is not None:
+        if times.counts:
+            _refuse_if_told(table, times.seconds, [])
+        return
+    for name in counters:
+        _refuse_if_told(table, table.numbers[name], [name])
+
+
+def _refuse_if_told(table: Contents, values: np.ndarray, counter: list[str]) -> None:
+    restarts = np.diff(values) < 0
+    if not 0 < restarts.sum() < len(restarts) / 2:  # others fall, with the latest row first
+        return
+    told = [
+        name
+        for name, numbers in table.numbers.items()
+        if name not in counter and np.array_equal(np.diff(numbers) != 0, restarts)
+    ]
+    if not told:
+        return
+    options = [{"part_column": name} for name in told[:2]]
+    if counter:
+        options = [{"time": counter[0], **option} for option in options]
+    else:
+        options += [{"series_column": name} for name in told[:2]]
+    what = repr(counter[0]) if counter else "times"
+    raise InputError(
+        f"Expected one series, or to know what tells its parts apart. Received: {what} beginning "
+        f"again {counted(restarts.sum(), 'time')}, with another {told[0]!r} each time, in "
+        f"{table.what}.",
+        options,
+    )
