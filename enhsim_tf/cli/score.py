@@ -72,7 +72,15 @@ def run_score(options: argparse.Namespace) -> int:
             for name in scored.not_judged:
                 reason = left.get(name, "it is not in the source")
                 lines.append(f"{printable(name)}: not judged: {reason}")
-            tell("\n".join([*lines, *notes, *_said(scored, simulator, paths[model])]))
+            tell(
+                "\n".join(
+                    [
+                        *lines,
+                        *notes,
+                        *_said(scored, simulator, paths[model], options.chosen.false_alarm_rate),
+                    ]
+                )
+            )
 
     code = for_each(channels, write)
     if options.json:
@@ -80,7 +88,9 @@ def run_score(options: argparse.Namespace) -> int:
     return code
 
 
-def _said(scored: ScoredTelemetry, simulator: EnhancedSimulator, path: Path) -> list[str]:
+def _said(
+    scored: ScoredTelemetry, simulator: EnhancedSimulator, path: Path, wanted: float
+) -> list[str]:
     name = spoken(simulator.channels)
     lines = []
     table = scored.table
@@ -95,6 +105,8 @@ def _said(scored: ScoredTelemetry, simulator: EnhancedSimulator, path: Path) -> 
         f"({num_flags / max(num_scored, 1):.1%}) flagged, set to flag "
         f"{scored.false_alarm_rate:.1%} of nominal samples"
     )
+    if scored.false_alarm_rate > wanted:
+        line += f", of which there are too few for {100 * wanted:g}%"
     if left:
         line += f"; {counted(left, 'sample')} not scored, in parts shorter than a window or "
         line += "without a coarse run"

@@ -91,6 +91,7 @@ class Sheet:
     ):
         times = told_times(index, clock)
         has_time = hasattr(times, "tz")
+        self.lines = 1 + int(above / 0.2)  # of words above a panel
         self.times = matplotlib.dates.date2num(times) if has_time else times.to_numpy(np.float64)
         steps = np.diff(self.times)
         self.step = np.median(steps)
@@ -134,10 +135,10 @@ class Sheet:
 
     def shade(self, axes: Axes, spans: Sequence[tuple[int, int, str]]) -> None:
         """Shades stretches of time, each given by its first sample, its end and a word; if they are
-        few, writes the words in three lines above.
+        few, writes the words in lines above.
         """
         (low, high) = axes.get_xlim()
-        taken = [0.0] * 3 if len(spans) <= _MOST_NAMED else []
+        taken = [0.0] * self.lines if len(spans) <= _MOST_NAMED else []
         for begin, end, word in spans:
             # the next sample may come after a gap
             first = self.times[begin]
