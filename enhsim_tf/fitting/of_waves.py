@@ -1,6 +1,7 @@
 """Fits square waves, or constant levels, and the enhancer to telemetry (section 2.2)."""
 
 import dataclasses
+import functools
 import itertools
 from collections.abc import Sequence
 
@@ -43,12 +44,16 @@ def fit_waves(recording: Telemetry, options: FitOptions, progress: Progress) -> 
     """Fits one square wave or constant level to each channel; see `fit.fit`."""
     learnt, held_out, note = _split(recording, options.held_out)
     channels = recording.columns
-    refused: dict[int, str] = {}
+    refused: dict[str, str] = {}
+    told = progress.loop("coarse simulator", len(channels))
+
+    @functools.cache  # those of the other channels stay where one is refused
+    def chosen(name: str, why: str | None) -> CoarseChoice:
+        told(channels.index(name))
+        return choose_coarse(learnt.select([name]), options.window, why)
+
     while True:
-        choices = [
-            choose_coarse(learnt.select([name]), options.window, refused.get(channel))
-            for channel, name in enumerate(channels)
-        ]
+        choices = [chosen(name, refused.get(name)) for name in channels]
         reasons = [choice.said for choice in choices]
         if len(channels) > 1:
             reasons = [f"{name}: {said}" for name, said in zip(channels, reasons, strict=True)]
@@ -61,7 +66,7 @@ def fit_waves(recording: Telemetry, options: FitOptions, progress: Progress) -> 
         try:
             waves, choice, noise, clean = _fit_aligned(usable, choices, window, options, progress)
         except _FlatError as error:
-            refused[error.channel] = (
+            refused[channels[error.channel]] = (
                 "nothing can be learnt from its best square wave, which its windows do not follow"
             )
         else:
