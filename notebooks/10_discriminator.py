@@ -167,6 +167,7 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
         panel.axline((recorded.mean(), recorded.mean()), slope=1, color=QUIET, linewidth=0.8)
         panel.set(title=name, xlabel="probability real, as recorded")
         panel.margins(0.06)
+        panel.locator_params(axis="x", nbins=3)
     panels[0].set(ylabel="probability real, changed")
 
 # %% [markdown]
@@ -177,7 +178,7 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
 # %%
 moved = {name: float(np.mean(np.abs(other - recorded))) for name, other in judged.items()}
 for name, change in moved.items():
-    print(f"{name:18} mean change of the probability {change:.3f}")
+    print(f"{name:18} mean change of the probability {change:.4f}")
 assert moved["reordered blocks"] < moved["reordered samples"] / 1.5
 assert not is_full or moved["reordered blocks"] < moved["larger"] / 1.5
 
@@ -201,7 +202,8 @@ generated = pipeline.generate_noise(number, np.random.default_rng(10))
 
 
 def auc(scores, scores_of_real):
-    return np.mean(scores[:, None] > scores_of_real[None, :])
+    difference = scores[:, None] - scores_of_real[None, :]
+    return np.mean(difference > 0) + np.mean(difference == 0) / 2  # equal scores count one half
 
 
 def log_power(windows):
@@ -227,32 +229,35 @@ floors = {name: judge(more_real, held_out) for name, judge in judges.items()}
 
 # %%
 alt = "AUC of three judges that tell the noise of the GAN from real noise, each with its floor"
-title = "Two simple judges recognise generated noise; the discriminator does not"
+title = "Two simple judges recognise generated noise far better than the discriminator"
 with drawing(alt, height=1.7, title=title) as panel:
     for row, name in enumerate(judges):
         panel.plot([floors[name], found[name]], [row, row], color=QUIET, linewidth=0.8)
     panel.plot(list(floors.values()), list(floors), "s", color=REAL, label="floor: real against real")
     panel.plot(list(found.values()), list(found), "o", color=GENERATED, label="generated against real")
-    panel.set(xlabel="AUC (0.5: cannot tell; 1: always right)", xlim=(0.4, 1.02), ylim=(2.5, -0.5))
+    left = min(0.4, found["discriminator"] - 0.05)
+    panel.set(xlabel="AUC (0.5: cannot tell; 1: always right)", xlim=(left, 1.02), ylim=(2.5, -0.5))
     panel.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
 
 # %% [markdown]
-# *What to see:* the discriminator is near its floor and near 0.5, and the other two judges are far from their floors. (A floor below 0.5
-# shows how far chance, or a difference between training and held-out windows, moves the AUC.) Generated windows differ from real ones, and
-# a linear classifier is enough to find it. The lost places are not the whole reason: the power of each frequency holds no places either.
-# The generator learns from the discriminator alone, which at this point can hardly tell the two apart.
+# *What to see:* two judges are nearly always right, and far from their floors. The discriminator is far from them. How far differs from run
+# to run: with another seed it takes generated windows for real more often than real ones (AUC below 0.5), with a third it gives nearly the
+# same probability to all. (A floor below 0.5 shows how far chance, or a difference between training and held-out windows, moves the AUC.)
+# Generated windows differ from real ones, and a linear classifier is enough to find it. The lost places are not the whole reason: the power
+# of each frequency holds no places either. The generator learns from the discriminator alone, which at this point sees little of that
+# difference.
 
 # %%
 for name in judges:
     print(f"{name:24} AUC {found[name]:.2f}   floor {floors[name]:.2f}")
 if is_full:
-    assert abs(found["discriminator"] - 0.5) < 0.1
+    assert 0.1 < found["discriminator"] < 0.9
     assert min(found["values at their places"], found["power of each frequency"]) > 0.9
     assert max(floors.values()) < 0.6
 
 # %% [markdown]
-# **Answer.** It sees which short pieces a window holds and how large they are. It cannot see their order. As trained, it also misses the
-# difference that a linear classifier finds in single windows; whether it could learn to see it was not tested.
+# **Answer.** It sees which short pieces a window holds and how large they are. It cannot see their order. As trained, it also misses most
+# of the difference that a linear classifier finds in single windows; whether it could learn to see it was not tested.
 #
 # ## Exercises
 #

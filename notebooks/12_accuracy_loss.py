@@ -98,8 +98,8 @@ say(
 assert budget == "smoke" or np.sum(steps > 2 * 2**0.5 * error) > 2
 
 # %% [markdown]
-# So the large swings are not chance: $D$ moves over one half several times. Both accuracies together may even be far below one half,
-# because each record follows an update of the generator, which raises $D$ of generated rows.
+# So the large swings are not chance: $D$ moves over one half several times. Both accuracies together may even be far below one half. Then
+# the generator is ahead: generated rows have a higher $D$ than real ones.
 
 # %% [markdown]
 # ## What the figure does not show
