@@ -45,7 +45,7 @@ DRAWN_BY_HAND = ("fig01_pipeline", "fig11_gan_training")  # figures that are kep
 BUDGET = "ENHSIM_TF_BUDGET"  # environment variable with the budget of the pipeline
 STATIC = "ENHSIM_TF_STATIC"  # set while a lesson is executed to be read: its sliders then need no kernel
 NOT_ANSWERED, RIGHT, NOT_YET = "Not yet answered.", "Right.", "Not yet."
-_MOST_FRAMES = 12  # drawn beforehand for a slider
+_MOST_FRAMES = 10  # drawn beforehand for a slider
 _frames: list[tuple[bytes, dict[str, Any]]] | None = (
     None  # of a slider while they are drawn, instead of being displayed
 )
