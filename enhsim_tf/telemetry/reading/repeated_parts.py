@@ -73,34 +73,26 @@ def refuse_restarts(table: Contents, counters: Collection[str], times: Times | N
     """Refuses times, or `counters` of rows beside no clock, that begin again with each value of
     another column of numbers.
     """
-    if times is not None:
-        if times.counts:
-            _refuse_if_told(table, times.seconds, [])
-        return
-    for name in counters:
-        _refuse_if_told(table, table.numbers[name], [name])
-
-
-def _refuse_if_told(table: Contents, values: np.ndarray, counter: list[str]) -> None:
-    restarts = np.diff(values) < 0
-    if not 0 < restarts.sum() < len(restarts) / 2:  # others fall, with the latest row first
-        return
-    told = [
-        name
-        for name, numbers in table.numbers.items()
-        if name not in counter and np.array_equal(np.diff(numbers) != 0, restarts)
-    ]
-    if not told:
-        return
-    options = [{"part_column": name} for name in told[:2]]
-    if counter:
-        options = [{"time": counter[0], **option} for option in options]
-    else:
-        options += [{"series_column": name} for name in told[:2]]
-    what = repr(counter[0]) if counter else "times"
-    raise InputError(
-        f"Expected one series, or to know what tells its parts apart. Received: {what} beginning "
-        f"again {counted(restarts.sum(), 'time')}, with another {told[0]!r} each time, in "
-        f"{table.what}.",
-        options,
-    )
+    numbers = table.numbers
+    counts = {name: numbers[name] for name in counters} if times is None else {}
+    if times is not None and times.counts:
+        counts[""] = times.seconds
+    for counter, values in counts.items():
+        restarts = np.diff(values) < 0
+        if not 0 < restarts.sum() < len(restarts) / 2:  # others fall, with the latest row first
+            continue
+        told = [
+            {"part_column": name}
+            for name, each in numbers.items()
+            if np.array_equal(np.diff(each) != 0, restarts)
+        ][:2]
+        if not told:
+            continue
+        others = [{"series_column": option["part_column"]} for option in told]
+        raise InputError(
+            "Expected one series, or to know what tells its parts apart. Received: "
+            f"{repr(counter) if counter else 'times'} beginning again "
+            f"{counted(restarts.sum(), 'time')}, with another {told[0]['part_column']!r} each "
+            f"time, in {table.what}.",
+            [{"time": counter, **option} for option in told] if counter else [*told, *others],
+        )
