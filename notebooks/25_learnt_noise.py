@@ -218,8 +218,9 @@ with drawing(alt, height=2.0, title="The network expects larger samples while a 
 
 # %% [markdown]
 # *What to see:* the orange lines open after the first loud samples of a burst and close within some twenty samples after the last. The
-# network does not foresee a burst, but expects it to go on. Within bursts, the process draws samples with a standard deviation of 2.3, never
-# more (`bursts` in `studies/common/noise_processes.py`): what the lines show beyond, as in the two narrow peaks, is the network's error.
+# network does not foresee a burst, but expects it to go on. Within bursts, the process draws samples with a standard deviation of 2.3,
+# never more (`bursts` in `studies/common/noise_processes.py`): what the lines show beyond, as in the two narrow peaks, is the network's
+# error.
 
 # %%
 loud = np.abs(chosen[PAST - 5 : -5]) > 2  # five samples ago, it was loud

@@ -22,6 +22,7 @@ TESTS = [
     for number, length in enumerate(LENGTHS)
 ]
 TOGETHER = pd.concat(TESTS, ignore_index=True)
+WORDS = TOGETHER.assign(unit=TOGETHER.unit.map("u{}".format))
 COUNTED = TOGETHER.rename(columns={"time": "sample"}).astype({"sample": int})
 
 
@@ -38,7 +39,7 @@ def check_parts(telemetry):
     [
         (TOGETHER, None),
         (COUNTED, "sample"),
-        (TOGETHER.assign(unit=TOGETHER.unit.map("u{}".format)), None),
+        (WORDS, None),
     ],
     ids=["times", "samples", "words"],
 )
@@ -74,13 +75,39 @@ def test_parts_are_further_apart_than_gaps_that_are_filled():
     assert [len(part) for part in telemetry.parts] == list(LENGTHS)
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        TOGETHER.sort_values(["time", "unit"], ascending=[True, False], kind="stable"),
+        TOGETHER.loc[TOGETHER.index.repeat(2)],
+    ],
+    ids=["interleaved", "each row twice"],
+)
+def test_the_order_of_the_rows_of_different_parts_does_not_matter(table):
+    (telemetry,) = read_telemetry(table.reset_index(drop=True), Cleaning(part_column="unit"))
+    check_parts(telemetry)
+
+
+def test_parts_are_further_apart_than_gaps_of_a_given_interval():
+    table = TOGETHER.assign(time=TOGETHER.time / 10)
+    cleaning = Cleaning(part_column="unit", interval_s=1)
+    (telemetry,) = read_telemetry(table, cleaning)
+    assert [len(part) for part in telemetry.parts] == [4, 3, 3]  # 2.9, 1.9 and 2.4 s
+
+
+def test_a_value_that_comes_again_is_another_part():
+    table = TOGETHER.assign(unit=np.repeat([1, 2, 1], LENGTHS))
+    (telemetry,) = read_telemetry(table, Cleaning(part_column="unit"))
+    check_parts(telemetry)
+
+
 def test_a_part_begins_at_its_own_first_time():
     table = TOGETHER.assign(time=TOGETHER.time + np.where(TOGETHER.unit == 6, 15, 0))
     (telemetry,) = read_telemetry(table, Cleaning(part_column="unit"))
     assert [part.offset_s for part in telemetry.parts] == [0, 115, 200]
 
 
-@pytest.mark.parametrize("table", [TOGETHER, COUNTED], ids=["times", "samples"])
+@pytest.mark.parametrize("table", [TOGETHER, COUNTED, WORDS], ids=["times", "samples", "words"])
 def test_advice_where_times_begin_again_tells_the_parts_apart(tmp_path, table):
     path = tmp_path / "tests.csv"
     table.to_csv(path, index=False)

@@ -111,7 +111,8 @@ def lay_out(
         times, said = one_after_another(table, times, options)
         table = dataclasses.replace(table, findings=(*table.findings, said))
     elif options.series_column is None:
-        refuse_restarts(contents, left_out.get("row numbers", ()) if time is None else (), times)
+        counters = left_out.get("row numbers", ()) if time is None else ()
+        refuse_restarts(contents, counters, times, words if len(channels) > 1 else ())
     return Layout(
         **vars(table),
         clock=clock,

@@ -49,12 +49,16 @@ def one_after_another(
         number, _ = files_of_rows(table.places, len(table.frame))
     else:
         number = table.frame.groupby(column, sort=False, dropna=False).ngroup().to_numpy()
-    own_s = times.seconds
-    own_s = own_s[np.isfinite(own_s)]
-    step_s = np.median(np.abs(np.diff(own_s))) if len(own_s) > 1 else 0.0
+    own_s = pd.Series(times.seconds)
+    steps_s = own_s.groupby(number).diff()
+    long_s = float(np.nan_to_num(steps_s[steps_s > 0].quantile(0.9)))
+    # a value that comes again, as that of a step of every cycle, begins another part
+    again = (steps_s < -10 * long_s).groupby(number).cumsum()
+    number = again.groupby([number, again], sort=False).ngroup().to_numpy()
     # further apart than a gap that is filled
-    reach_s = np.ptp(np.append(own_s, 0.0)) + (options.longest_gap + 2) * step_s
-    apart_s = 10 ** int(np.ceil(np.log10(max(reach_s, 1.0))))
+    gap_s = (options.longest_gap + 2) * max(long_s, options.interval_s or 0.0)
+    reach_s = own_s.max() - min(own_s.min(), 0.0) + gap_s
+    apart_s = 10 ** int(np.ceil(np.log10(max(np.nan_to_num(reach_s), 1.0))))
     last = int(number.max(initial=0))
     if (last * apart_s + reach_s) * 1e9 > LARGEST_NS:
         raise InputError(
@@ -69,11 +73,14 @@ def one_after_another(
     return placed, Finding("parts", last + 1, text)
 
 
-def refuse_restarts(table: Contents, counters: Collection[str], times: Times | None) -> None:
+def refuse_restarts(
+    table: Contents, counters: Collection[str], times: Times | None, words: Collection[str]
+) -> None:
     """Refuses times, or `counters` of rows beside no clock, that begin again with each value of
-    another column of numbers.
+    another column, of numbers or one of `words`.
     """
     numbers = table.numbers
+    codes = numbers | {name: pd.factorize(table.frame[name])[0] for name in words}
     counts = {name: numbers[name] for name in counters} if times is None else {}
     if times is not None and times.counts:
         counts[""] = times.seconds
@@ -83,7 +90,7 @@ def refuse_restarts(table: Contents, counters: Collection[str], times: Times | N
             continue
         told = [
             {"part_column": name}
-            for name, each in numbers.items()
+            for name, each in codes.items()
             if np.array_equal(np.diff(each) != 0, restarts)
         ][:2]
         if not told:
