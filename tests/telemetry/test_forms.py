@@ -1303,3 +1303,24 @@ def test_a_short_row_below_no_header_moves_no_value(written, refused):
     rows[20] = rows[20].rpartition(",")[0]
     with refused("line 21"):
         read_source(written("\n".join(rows)), options=NO_HEADER)
+
+
+def test_names_in_merged_cells_go_before_those_below_them(tmp_path):
+    columns = [VALUES, VALUES + 1, VALUES + 2, VALUES + 3]
+    path = tmp_path / "merged.csv"
+    path.write_text(
+        table("Time;Pump;;Fan;\n;Flow;Power;Flow;Temp", MINUTES, *columns, separator=";")
+    )
+    channels = read_source(path)
+    assert list(channels) == ["Pump Flow", "Pump Power", "Fan Flow", "Fan Temp"]
+    check(channels["Fan Flow"], VALUES + 2)
+
+
+def test_quoted_numbers_of_rows_without_a_name_as_r_writes_them(tmp_path):
+    path = tmp_path / "r.txt"
+    rows = [
+        f'"{k + 1}","{time}",{value}'
+        for k, (time, value) in enumerate(zip(MINUTES, VALUES, strict=True))
+    ]
+    path.write_text("\n".join(['"date","v"', *rows]))
+    check(one(path))

@@ -262,7 +262,8 @@ def _lay_out(mark: str, lines: Sequence[str], no_header: bool) -> Dialect | None
     if block < top and no_header:
         begin = block
     elif block < top:
-        given, units = _names_of(rows[block:top], below, sample, mark, width)
+        line = "".join(lines[begin : begin + 1])
+        given, units = _names_of(rows[block:top], below, line, sample, mark, width)
         if not any(given) or len(given) == 1 < width:
             return None
         names = given if len(given) == width else []  # which is refused
@@ -316,29 +317,39 @@ def _begin_of(
 def _names_of(
     block: Sequence[list[str]],
     below: Sequence[str],
+    line: str,
     sample: Sequence[Sequence[str]],
     mark: str,
     width: int,
 ) -> tuple[list[str], Sequence[str]]:
-    """Returns the names and the units in a block of lines above the first row of data; fewer names
-    than columns if a sample of the data has values in the others.
+    """Returns the names and the units in a block of lines above the first row of data, whose cells
+    are `below` and whose text is `line`; fewer names than columns if a sample of the data has
+    values in the others.
     """
     # the line of the most different names, of several the first
     header = max(range(len(block)), key=lambda number: len({*block[number]} - {""}))
     given = block[header]
-    if mark == BLANKS and below and len(given) == width - 1:
+    if below and len(given) == width - 1:
         # a date and a time of day below one name
-        if len(given) > 1 and ":" in below[1]:
+        if mark == BLANKS and len(given) > 1 and ":" in below[1]:
             given = ["", *given]
-        # R writes quoted names, and none above the numbers of the rows
-        elif below[0] == '"1"':
+        # R writes no name above the numbers of the rows, and quotation marks
+        elif line.startswith('"1"'):
             given = ["", *(cell.strip('"') for cell in given)]
     if any(any(row[len(given) :]) for row in sample):
         return given, ()
     names = given + [""] * (width - len(given))
-    # names in two lines, as under merged cells
+    # names in two lines; those in merged cells go before several of the other line
     for row in (*block[:header], *block[header + 1 :]):
-        names = [name or other for name, other in itertools.zip_longest(names, row, fillvalue="")]
+        pairs = list(itertools.zip_longest(names, row, fillvalue=""))
+        is_merged = any(other and not name for name, other in pairs[1:]) and all(
+            other for _, other in pairs[1:]
+        )
+        before = ""
+        for place, (name, other) in enumerate(pairs):
+            before = name or before
+            joined = f"{before} {other}" if is_merged and place else name or other
+            names[place] = joined.strip()
     return names, block[header + 1] if header + 1 < len(block) else ()
 
 
