@@ -611,6 +611,25 @@ REFUSED_TEXTS = {
         table("time,v", UTC, [f'"{round(100 * value)},{k % 2}"' for k, value in enumerate(VALUES)]),
         "values and flags in columns of their own",
     ),
+    "dates of another zone than others beside them": (
+        table("time,iso,v", stamps("%F %T"), stamps("%FT%T+01:00"), VALUES),
+        "1 h apart",
+        60,
+    ),
+    "a zone above the table": (
+        table("# Timezone: -07:00\ntime,v", stamps("%F %T"), VALUES),
+        "Timezone: -07:00",
+        60,
+    ),
+    "a zone in letters": (table("Time (AEST),v", stamps("%F %T"), VALUES), "(AEST)", 60),
+    "days since another zero": (
+        table("time (days since 2020-01-01),v", SECONDS, VALUES),
+        "another zero than 1970",
+    ),
+    "another zero in a line of units": (
+        table("time,v\nhours since 1900-01-01,V", SECONDS, VALUES),
+        "another zero than 1970",
+    ),
     "dates of another zone than times since 1970 beside them": (
         table("unix,time,v", UNIX, stamps("%Y-%m-%d 10:%M:%S"), VALUES),
         "10 h apart",
@@ -1323,4 +1342,16 @@ def test_quoted_numbers_of_rows_without_a_name_as_r_writes_them(tmp_path):
         for k, (time, value) in enumerate(zip(MINUTES, VALUES, strict=True))
     ]
     path.write_text("\n".join(['"date","v"', *rows]))
+    check(one(path))
+
+
+def test_a_unit_in_the_name_of_a_given_clock_holds(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(table("Tid [min],v", np.arange(N), VALUES))
+    check(one(path, time="Tid [min]"), start="1970-01-01T00:00Z")
+
+
+def test_utc_above_the_table_is_no_other_zone(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(table("# Time zone: UTC\ntime,v", stamps("%F %T"), VALUES))
     check(one(path))

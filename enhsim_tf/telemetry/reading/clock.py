@@ -63,8 +63,16 @@ _FACTOR = re.compile(
     rf"(?:[\[(]\s*x?|(?<!\d)/\s*|_)(\d[\d./^*-]*)[ *]*(?:{'|'.join(UNIT_OF)})(?![^\W\d_])",
     re.IGNORECASE,
 )
-_PLACE = re.compile(r"\b[A-Z][a-z]+/[A-Z]\w+\b")  # as Europe/Berlin
-_ZONE = re.compile(r"\b(?:CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b")
+# zeros of times other than 1970
+_SINCE = re.compile(r"since[\W_]+(?!.*1970)\d\d|mjd[\W_]?2", re.IGNORECASE)
+_IN_BRACKETS = re.compile(r"[\[(]\s*([^\W\d_]+)\s*[\])]\s*$")
+_PLACE = re.compile(r"\b[A-Z]\w+/[A-Z]\w+\b")  # as Europe/Berlin
+_ZONE = re.compile(
+    r"\b(?:CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b|(?:UTC|GMT)[+-]\d|"
+    r"[\[(](?!UTC|GMT|ISO|[YMDHS]+\W)[A-Z]{2,5}[\])]"  # letters that are no form of dates
+)
+_ZONE_ABOVE = re.compile(r".{,20}\btime ?zone\b.{,20}", re.IGNORECASE)
+_UTC = re.compile(r"(?:UTC|GMT)(?!\W?[+-]?\d)")
 _TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(?!\d).*"
 _WITH_YEAR = re.compile(r"\d:\d\d.*\b20\d\d|\b20\d\d.*\d:\d\d")
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
@@ -290,22 +298,29 @@ def unit_of(clock: Clock, table: Table) -> str | None:
     if len(clock.columns) != 1:
         return None
     name = clock.columns[0]
+    is_numeric = pd.api.types.is_numeric_dtype(clock.cells.dtype)
     unit = table.units.get(name, "").strip(" []().")
-    factor = _FACTOR.search(f"{name} [{unit}]")
-    is_one = factor and re.fullmatch(r"0+|1(?:\.0*)?|24", factor[1])
-    if factor and not is_one and pd.api.types.is_numeric_dtype(clock.cells.dtype):
+    stated = f"{name} [{unit}]"
+    factor = _FACTOR.search(stated)
+    words = words_of(name)
+    form = name_tells(name)[1] or UNIT_OF.get(unit.casefold().partition(" ")[0])
+    form = form or (UNIT_OF.get(words[-1]) if len(words) > 1 else None)
+    in_brackets = _IN_BRACKETS.search(name)
+    unknown = ""
+    if factor and not re.fullmatch(r"0+|1(?:\.0*)?|24", factor[1]):
+        unknown = "a multiple of a unit"
+    elif _SINCE.search(stated):
+        unknown = "another zero than 1970"
+    elif in_brackets and form is None and not name_tells(name)[0]:
+        unknown = f"the unit {in_brackets[1]}"
+    if unknown and is_numeric:
         raise InputError(
-            f"Expected times in s, ms, us or ns. Received: a multiple of a unit in {name!r} of "
-            f"{table.what}.",
+            f"Expected times in s, ms, us or ns, since 1970 or from zero. Received: {unknown} in "
+            f"{name!r} of {table.what}.",
             [_COUNT],
-            "the times in one of these units, and with its name",
+            "the times as dates, as pandas.to_datetime makes them with unit and origin",
         )
-    form = name_tells(name)[1] or UNIT_OF.get(unit.casefold())
-    if (
-        form is None
-        and pd.api.types.is_numeric_dtype(clock.cells.dtype)
-        and re.search(r"dat(?:e|um)", name.casefold())
-    ):
+    if form is None and is_numeric and re.search(r"dat(?:e|um)|ju?ld?$", name.casefold()):
         values = clock.cells.to_numpy(np.float64, na_value=np.nan)
         refuse_two_meanings(values[np.isfinite(values)], f"{name!r} of {table.what}", is_date=True)
     return form
@@ -333,6 +348,7 @@ def offset_of(clock: Clock, table: Table, zone: str | None) -> pd.Timedelta | No
     head = frame.iloc[:LOOK]
     texts = [str(cell) for name in frame if is_text(head[name]) for cell in head[name].dropna()[:1]]
     beside += [text for text in texts if _WITH_YEAR.search(text) and _ZONE.search(text)]
+    beside += [text for text in _ZONE_ABOVE.findall(table.above) if not _UTC.search(text)]
     is_utc = "utc" in named.casefold()
     if _ZONE.search(named) or (places or beside) and not is_utc:
         raise InputError(
@@ -346,21 +362,28 @@ def offset_of(clock: Clock, table: Table, zone: str | None) -> pd.Timedelta | No
 
 
 def refuse_other_zone(times: Times, table: Contents, further: Collection[str]) -> None:
-    """Refuses dates without a zone that `further` columns, of numbers since 1970, show in another
-    zone than UTC.
+    """Refuses dates without a zone that `further` columns, of numbers since 1970 or of dates with a
+    zone, show in another zone than UTC.
     """
-    for name, values in table.numbers.items():
-        unit = epoch_unit_of(values)
-        if name in further and unit is not None and name_tells(name)[0] == 2:
+    for name in further:
+        if name in table.numbers:
+            values = table.numbers[name]
+            unit = epoch_unit_of(values)
+            if unit is None or name_tells(name)[0] < 2:
+                continue
             stamps = pd.to_datetime(values, unit=unit, errors="coerce")
-            apart = abs((stamps - times.stamps).median())
-            if pd.Timedelta("15min") <= apart <= pd.Timedelta("14h"):
-                raise InputError(
-                    f"Expected dates that agree with times since 1970. Received: {name!r} of "
-                    f"{table.what}, {apart.total_seconds() / 3600:g} h apart from them.",
-                    [{"time": name}],
-                    "the zone of the dates with --timezone",
-                )
+        elif first_cells(table.frame[name]).str.fullmatch(r".*[T ].*\d[+-]\d\d:?\d\d").all():
+            stamps = parse_times(table.frame[name], "", drop=True).stamps.tz_localize(None)
+        else:
+            continue
+        apart = abs((stamps - times.stamps).median())
+        if pd.Timedelta("15min") <= apart <= pd.Timedelta("14h"):
+            raise InputError(
+                f"Expected dates that agree with times whose zone is known. Received: {name!r} of "
+                f"{table.what}, {apart.total_seconds() / 3600:g} h apart from them.",
+                [{"time": name}],
+                "the zone of the dates with --timezone",
+            )
 
 
 def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:

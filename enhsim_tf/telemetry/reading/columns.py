@@ -88,7 +88,7 @@ def lay_out(
     further = further_clocks(contents, clock, times)
     _take(roles, {"clock": clock.columns, "further clocks": further})
     if times is not None and not times.zone and options.timezone is None:
-        refuse_other_zone(times, contents, further)
+        refuse_other_zone(times, contents, further.difference(clock.columns))
     free_numbers = {name: values for name, values in numbers.items() if name not in roles}
     has_names = "column 1" not in kinds
     counted = [
