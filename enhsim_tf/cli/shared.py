@@ -3,6 +3,7 @@
 import argparse
 import collections
 import contextlib
+import dataclasses
 import os
 import sys
 import traceback
@@ -17,7 +18,7 @@ from enhsim_tf.simulator.model_folder import channels_of, folder_of
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean_all
 from enhsim_tf.telemetry.cleaning.raw import RawChannel
-from enhsim_tf.telemetry.cleaning.report import Report
+from enhsim_tf.telemetry.cleaning.report import Finding, Report
 from enhsim_tf.telemetry.joining import join_channels
 from enhsim_tf.telemetry.reading.channels import Channels
 from enhsim_tf.telemetry.series import Telemetry
@@ -170,7 +171,14 @@ def cleaned_channels(
     cleaned = clean_all(channels, cleaning, failed=failed)
     telemetry = {name: each.telemetry for name, each in cleaned.items()}
     reports = {name: each.report for name, each in cleaned.items()}
-    return (join_channels(telemetry) if telemetry else []), reports
+    groups = join_channels(telemetry) if telemetry else []
+    for group in groups:
+        for name in group.columns:
+            if left := len(telemetry[name]) - len(group):
+                said = f"samples at which another channel has none: {left:,}"
+                findings = (*reports[name].findings, Finding("other channels", left, said))
+                reports[name] = dataclasses.replace(reports[name], findings=findings)
+    return groups, reports
 
 
 def on_one_clock(

@@ -616,6 +616,12 @@ REFUSED_TEXTS = {
         "1 h apart",
         60,
     ),
+    "a quotation mark without its pair, and another one further down": (
+        PLAIN.replace(f",{VALUES[5]}", f',"{VALUES[5]}').replace(
+            f",{VALUES[20]}", f',{VALUES[20]}"'
+        ),
+        "line 7",
+    ),
     "a zone above the table": (
         table("# Timezone: -07:00\ntime,v", stamps("%F %T"), VALUES),
         "Timezone: -07:00",
@@ -1354,4 +1360,16 @@ def test_a_unit_in_the_name_of_a_given_clock_holds(tmp_path):
 def test_utc_above_the_table_is_no_other_zone(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text(table("# Time zone: UTC\ntime,v", stamps("%F %T"), VALUES))
+    check(one(path))
+
+
+def test_a_minus_sign_is_one(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(table("time,v", UTC, [f"\u2212{value}" for value in VALUES]), encoding="utf-8")
+    check(one(path), -VALUES)
+
+
+def test_a_year_and_a_month_beside_dates_are_no_channels(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(table("time,Year,Month,v", UTC, [2024] * N, [3] * N, VALUES))
     check(one(path))

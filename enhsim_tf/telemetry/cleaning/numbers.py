@@ -222,7 +222,7 @@ def _parse_text_numbers(
     for row in np.flatnonzero(left & ~of_text):
         parsed[row] = _parse_object(cells.iloc[row])
     rows = np.flatnonzero(left & of_text)
-    text = cells.iloc[rows].str.strip()
+    text = cells.iloc[rows].str.strip().str.replace("\u2212", "-", regex=False)  # a minus sign
     text, unit = _without_unit(text) if units else (text, "")
     text = _plain(text)
     sign = decimal or _sign_of(text)

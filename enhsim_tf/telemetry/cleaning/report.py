@@ -26,7 +26,7 @@ _ACTIONS = {
     "repaired": "unsorted, other rates, jitter, gaps filled",
     "left out": (
         "ragged lines, padding, missing times, bad times, clock change, duplicate rows, same time, "
-        "missing values, bad values, averaged, short parts"
+        "missing values, bad values, averaged, short parts, other channels"
     ),
 }
 KINDS = {kind: action for action, kinds in _ACTIONS.items() for kind in kinds.split(", ")}

@@ -269,7 +269,7 @@ def _refuse_unknown(table: Contents) -> None:
                 *(
                     {"time": name, "time_format": "ms"}
                     for name in clocks
-                    if not is_epoch(numbers[name])
+                    if not (is_epoch(numbers[name]) or compact_form(numbers[name]))
                 ),
                 _COUNT,
             ],
@@ -466,7 +466,8 @@ def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[st
         )
     for part, name in parts_of(numbers).items():
         values = getattr(times.stamps, part, None)
-        if values is not None and values.nunique() > 1 and (values == numbers[name]).mean() > 0.9:
+        is_part = part in ("year", "month", "day") or values is not None and values.nunique() > 1
+        if values is not None and is_part and (values == numbers[name]).mean() > 0.9:
             found.add(name)
     seconds = times.seconds
     for name, values in numbers.items():

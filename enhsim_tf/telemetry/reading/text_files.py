@@ -118,6 +118,7 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
         findings += ragged
         if ragged or frame is None:
             frame, decimal = _read_rows(data, 0, dialect, options.decimal)
+    _refuse_open_quote(frame, text, begin, dialect)
     if decimal == ",":
         findings.append(
             Finding(
@@ -154,6 +155,21 @@ def _may_be_ragged(frame: pd.DataFrame, text: bytes, begin: int, dialect: Dialec
         text.find(b'"', begin) >= 0
         or text.count(dialect.separator.encode(), begin) != num_separators
     )
+
+
+def _refuse_open_quote(frame: pd.DataFrame, text: bytes, begin: int, dialect: Dialect) -> None:
+    """Refuses a cell in quotation marks that holds what reads as rows of its own."""
+    if text.find(b'"', begin) < 0 or text.count(b"\n", begin) <= len(frame):
+        return
+    row_inside = rf"\n\d[^\n]*{re.escape(dialect.separator)}"
+    for column in filter(lambda column: is_text(frame[column]), frame):
+        found = frame[column].astype("str").str.contains(row_inside).fillna(False).to_numpy(bool)
+        if found.any():
+            raise InputError(
+                "Expected quotation marks in pairs. Received: one in line "
+                f"{int(np.argmax(found)) + dialect.line} of {dialect.file} with further lines "
+                "inside. Correct it."
+            )
 
 
 def _without_ragged(data: bytes, dialect: Dialect, drop: bool) -> tuple[bytes, list[Finding]]:
