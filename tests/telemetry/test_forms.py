@@ -113,6 +113,7 @@ DATED = {
     "year and day of year": ("Year,DOY,Hour,Min,v", "%Y,%j,%H,%M"),
     "year, month and day": ("YYYY,MM,DD,HH,mn,v", "%Y,%m,%d,%H,%M"),
     "a compact date and a time of day": ("Date,Time,v", "%Y%m%d,%H:%M:%S"),
+    "a date and a time of day, both with points": ("Date;Time;v", "%d.%m.%Y;%H.%M.%S", ";"),
     "months and minutes": ("YYYY,MM,DD,hh,mm,v", "%Y,%m,%d,%H,%M"),
     "a date, hours and minutes": ("date,hour,minute,v", "%Y-%m-%d,%H,%M"),
     "half days in a column": ("day,clock,half,v", "%d.%m.%Y,%I:%M:%S,%p"),

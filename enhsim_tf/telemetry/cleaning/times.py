@@ -447,7 +447,10 @@ def _orders(text: pd.Series, mark: str, year: str) -> list[str]:
     possible = [
         mark.join(order)
         for order in orders[: 3 if year == "%y" else 2]
-        if all(parts[place].max() <= most.get(kind, 99) for place, kind in enumerate(order))
+        if all(
+            parts[place].max() <= most.get(kind, 99) and parts[place].min() >= (kind in most)
+            for place, kind in enumerate(order)
+        )
     ]
     return possible[:1] if mark == "." else possible
 

@@ -29,6 +29,7 @@ _PARTS = {
 } | {unit: UNITS[unit] for unit in ("ms", "us", "ns")}
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
 _TIMES_OF_DAY = {"hhmm", "hhmmss"}
+_DOTTED = r" *(?:[01]?\d|2[0-3])\.[0-5]\d\.[0-5]\d *"
 _FRACTIONS = {"ms": 999, "us": 999_999, "ns": 999_999_999}  # of a second, at most
 _MOST = {"hour": 24, "minute": 60, "second": 60} | _FRACTIONS  # of a time of day
 _STATISTICS = set("max maximum mean avg average".split())  # beside which `min` is no minute
@@ -49,9 +50,13 @@ class Clock(NamedTuple):
 
 
 def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
-    """Returns a table in which the numbers of a column named `HHMM` or `HHMMSS` are times of day in
-    text, if there are days and no other times of day beside it.
+    """Returns a table in which the numbers of a column named `HHMM` or `HHMMSS`, or words such as
+    `18.00.00`, are times of day in text, if there are days and no other times of day beside it.
     """
+    for name in table.of_kind("words") if dates else ():
+        if first_cells(table.frame[name]).str.fullmatch(_DOTTED).all():
+            text = table.frame[name].str.replace(".", ":", regex=False)
+            return _with_text(table, name, text)
     found = {}
     for name, values in table.numbers.items():
         words = set(words_of(name)) - {"time", "utc", "gmt", "local"}
@@ -68,12 +73,16 @@ def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
     text = clocks.map(
         {clock: ":".join(re.findall("..", f"{clock:0{digits}}")) for clock in clocks.unique()}
     )
-    numbers = {other: values for other, values in table.numbers.items() if other != name}
+    return _with_text(table, name, text)
+
+
+def _with_text(table: Contents, name: str, text: pd.Series) -> Contents:
+    """Returns a table with times of day in text in one column."""
     return dataclasses.replace(
         table,
         frame=table.frame.assign(**{name: text}),
         kinds={**table.kinds, name: "times of day"},
-        numbers=numbers,
+        numbers={other: values for other, values in table.numbers.items() if other != name},
     )
 
 
