@@ -68,8 +68,8 @@ _SINCE = re.compile(r"since[\W_]+(?!.*1970)\d\d|mjd[\W_]?2", re.IGNORECASE)
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\W\d_]+)\s*[\])]\s*$")
 _PLACE = re.compile(r"\b[A-Z]\w+/[A-Z]\w+\b")  # as Europe/Berlin
 _ZONE = re.compile(
-    r"\b(?:CES?T|MES?Z|BST|JST|[ECMP][SD]T|\w+ (?:Standard|Daylight) Time)\b|(?:UTC|GMT)[+-]\d|"
-    r"[\[(](?!UTC|GMT|ISO|[YMDHS]+\W)[A-Z]{2,5}[\])]"  # letters that are no form of dates
+    r"\b(?:[CEW]ES?T|MES?Z|BST|JST|IST|MSK|HKT|SGT|SAST|LST|NZ[SD]T|A[CEWK][SD]T|[ECHMP][SD]T|"
+    r"\w+ (?:Standard|Daylight) Time)\b|(?:UTC|GMT)[+-]\d"
 )
 _ZONE_ABOVE = re.compile(r".{,20}\btime ?zone\b.{,20}", re.IGNORECASE)
 _UTC = re.compile(r"(?:UTC|GMT)(?!\W?[+-]?\d)")
