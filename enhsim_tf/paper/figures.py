@@ -326,9 +326,7 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
         )
         style = {"linestyle": DASHED, "marker": "s", "markersize": 3.5, "markerfacecolor": "white"}
         panel.plot(history["iteration"][chosen], lines["generated"], color=GENERATED, **style)
-        panel.set_ylim(
-            0, 1.02 if key == "accuracy" else max(1.02, 1.05 * np.max(list(lines.values())))
-        )
+        panel.set_ylim(-0.03, max(1.03, 1.05 * np.max(list(lines.values()))))
         panel.margins(x=0.03)
         panel.set(xlabel="iteration", ylabel=words)
         panel.xaxis.set_major_formatter("{x:,.0f}")

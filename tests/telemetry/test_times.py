@@ -42,6 +42,25 @@ def test_whole_numbers_with_a_fraction_column_are_read_by_their_format():
 
 
 @pytest.mark.parametrize(
+    ("numbers", "form"),
+    [
+        ([5, np.nan, 130], "%H%M"),
+        ([500, np.nan, 13_000], "%H%M%S"),
+        ([500.5, np.nan, 13_000.25], "%H%M%S.%f"),
+    ],
+)
+def test_numbers_that_lost_the_zeros_of_their_time_of_day_are_read_by_their_format(numbers, form):
+    times = parse_times(pd.Series(numbers), "clock", form=form)
+    assert times.stamps[[0, 2]].strftime("%H:%M").tolist() == ["00:05", "01:30"]
+    assert times.stamps[0].microsecond == round(numbers[0] % 1 * 1e6)
+
+
+def test_times_of_day_in_numbers_are_refused_with_their_format(refused):
+    with refused("times of day", "--time-format %H%M%S"):
+        refuse_two_meanings(np.array([115_958.0, 115_959.0, 120_000.0, 120_001.0]), "clock")
+
+
+@pytest.mark.parametrize(
     ("text", "form"),
     [
         ("2024-061", "%Y-%j"),

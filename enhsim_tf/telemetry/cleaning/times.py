@@ -133,11 +133,13 @@ def parse_times(
     if not is_text(times):
         if not is_format:
             return reader.of_numbers(times, form)
-        times = (
-            times.astype("Int64").astype(str).where(times.notna())
-            if (times.dropna() % 1 == 0).all()
-            else times.astype(str)
-        )
+        width = len(datetime.datetime(2000, 1, 1).strftime(form))  # numbers have lost leading zeros
+        given = times.notna()
+        if "%f" not in form and (times[given] % 1 == 0).all():
+            text = times.astype("Int64").astype(str).str.zfill(width)
+        else:
+            text = times.map(f"{{:0{width}.6f}}".format)
+        times = text.where(given)
     return reader.of_text(times, form, is_format)
 
 
@@ -326,7 +328,8 @@ def refuse_two_meanings(values: np.ndarray, what: str, is_date: bool = False) ->
         found["decimal years"] = ()
     has_hours = 1e4 <= high or np.ptp(np.diff(values)) > 0  # 50 after 0, and 100 after 50, are none
     if has_hours and low // 100 < high // 100 and may_be_time_of_day(values):
-        found["times of day"] = ()
+        form = "%H%M" if high < 2_400 else "%H%M%S"
+        found["times of day"] = (form + ".%f" * bool((values % 1).any()),)
     if 0 <= low < 1.2e9 and step >= 1_000 and step % 60 > 0:
         found["ms or us"] = ("ms", "us")
     if form := compact_form(values):
