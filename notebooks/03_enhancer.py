@@ -139,9 +139,9 @@ with drawing(alt, height=2.3, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the held-out loss stays above the dotted line and hardly falls after about ten epochs, apart from a jump. At the end the
-# training loss is lower. Nearly all inputs of the held-out windows also occur in training (notebook 04), so that the error to the true
-# signal is about the same in both: only learnt noise can explain the difference. The network has seen it 40 times.
+# *What to see:* the held-out loss stays above the dotted line and falls little after about fifteen epochs, here apart from a jump. At the
+# end the training loss is lower. Nearly all inputs of the held-out windows also occur in training (notebook 04), so that the error to the
+# true signal is about the same in both: only learnt noise can explain the difference. The network has seen it 40 times.
 
 # %%
 of_training = np.mean((pipeline.enhance(train["coarse"]) - train["truth"]) ** 2)

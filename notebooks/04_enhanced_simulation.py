@@ -169,7 +169,7 @@ with drawing(alt, height=1.7, title=title) as panel:
 # %% [markdown]
 # *What to see:* all three estimates are far better than the simulator, and the one matrix comes closest to the truth. On the few windows
 # that occur, one matrix is enough for the map from square waves to sines. Only 480 different inputs occur (notebook 02). The held-out
-# windows begin every 500 s and so have only 24 of them, all of which occurred in training:
+# windows begin every 500 s and so have only 24 of them, all of which occurred in training here:
 
 # %%
 seen = {window.tobytes() for window in train["coarse"]}
@@ -286,6 +286,7 @@ looks = [(QUIET, "-", "s"), (COARSE, ":", "^"), (ENHANCED, DASHED, "o"), (REAL, 
 with drawing(alt, height=2.2, title=title) as panel:
     for (name, values), (color, style, marker) in zip(of_heater.items(), looks):
         panel.plot(shares, values, color=color, linestyle=style, marker=marker, markersize=4, label=name)
+    panel.margins(x=0.03)
     panel.set(
         xlabel="standard deviation of the squared part over that of the linear part",
         ylabel="NRMSE on later time",
@@ -367,8 +368,8 @@ assert budget == "smoke" or pairs["nominal"][0] < pairs["nominal"][1]
 # %% [markdown]
 # Notebook 23 asks which modes can be recognised.
 #
-# **Answer.** On held-out nominal windows, its error is a ninth of the simulator's, and that of one matrix is less than half of this. It
-# stops being good at faults: in some modes it is worse than the simulator. Where no matrix will do, ask first what the physics suggests,
+# **Answer.** On held-out nominal windows, its error is about a tenth of the simulator's, and that of one matrix is less than half of this.
+# It stops being good at faults: in some modes it is worse than the simulator. Where no matrix will do, ask first what the physics suggests,
 # and what random features find.
 #
 # ## Exercises

@@ -111,8 +111,8 @@ assert budget == "smoke" or auc - floor > 0.1
 show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* little at a glance. Who looks longer sees that generated noise swells and fades (*d*). But what windows share is invisible
-# in a single one. Here is the first minute of the mean of the four windows of each kind, with that of four others:
+# *What to see:* little, but for one spike at the same place in *c* and *f*. But what windows share is invisible in a single one. Here is
+# the first minute of the mean of the four windows of each kind, with that of four others:
 
 # %%
 four_generated = pipeline.generate_noise(4, pipeline.draw("figure 6"))

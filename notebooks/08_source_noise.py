@@ -147,7 +147,7 @@ with drawing(alt, height=2.1, title=title) as panel:
     panel.axhline(true_sd, color=QUIET, linestyle=":", label="put in")
     panel.set(
         xlabel="width of the moving average (samples)",
-        ylabel="sd of the noise (dimensionless)",
+        ylabel="sd (dimensionless)",
         xlim=(0, 122),
     )
     panel.legend(frameon=False)

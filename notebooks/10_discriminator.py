@@ -160,7 +160,7 @@ judged = {name: probability_real(windows) for name, windows in changed.items()}
 
 # %%
 alt = "Judgement of real windows as recorded and after each of three changes: points near the diagonal are windows judged alike"
-title = "The discriminator overlooks the order of blocks, and notices size"
+title = "In this run, the discriminator overlooks the order of blocks, and notices size"
 with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
     for panel, (name, other) in zip(panels, judged.items()):
         panel.plot(recorded, other, "o", color=REAL, markersize=2, alpha=0.4)
@@ -172,8 +172,8 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
 
 # %% [markdown]
 # *What to see:* on the left, the points lie near the diagonal. In the middle they scatter more widely, and on the right they scatter most,
-# and many lie far below it. But all probabilities lie close to one half. (The axes differ in scale.) Reordered blocks keep nearly all
-# pieces of 20 samples, reordered samples keep none, and in the larger windows every piece has grown.
+# and nearly all lie far below it. But all probabilities are within 0.11 of one half. (The axes differ in scale.) Reordered blocks keep
+# nearly all pieces of 20 samples, reordered samples keep none, and in the larger windows every piece has grown.
 
 # %%
 moved = {name: float(np.mean(np.abs(other - recorded))) for name, other in judged.items()}
@@ -242,10 +242,10 @@ with drawing(alt, height=1.7, title=title) as panel:
 # %% [markdown]
 # *What to see:* two judges are nearly always right, and far from their floors. The discriminator is far from them. How far differs from run
 # to run: with another seed it takes generated windows for real more often than real ones (AUC below 0.5), with a third it gives nearly the
-# same probability to all. (A floor below 0.5 shows how far chance, or a difference between training and held-out windows, moves the AUC.)
-# Generated windows differ from real ones, and a linear classifier is enough to find it. The lost places are not the whole reason: the power
-# of each frequency holds no places either. The generator learns from the discriminator alone, which at this point sees little of that
-# difference.
+# same probability to all (not shown here). (A floor below 0.5 shows how far chance, or a difference between training and held-out windows,
+# moves the AUC.) Generated windows differ from real ones, and a linear classifier is enough to find it. The lost places are not the whole
+# reason: the power of each frequency holds no places either. The generator learns from the discriminator alone, which at this point sees
+# little of that difference.
 
 # %%
 for name in judges:
@@ -256,8 +256,8 @@ if is_full:
     assert max(floors.values()) < 0.6
 
 # %% [markdown]
-# **Answer.** It sees which short pieces a window holds and how large they are. It cannot see their order. As trained, it also misses most
-# of the difference that a linear classifier finds in single windows; whether it could learn to see it was not tested.
+# **Answer.** It can see which short pieces a window holds and how large they are. It cannot see their order. As trained, it also misses
+# most of the difference that a linear classifier finds in single windows; whether it could learn to see it was not tested.
 #
 # ## Exercises
 #

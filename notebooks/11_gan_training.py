@@ -215,8 +215,8 @@ for (phase, name), (number, total) in moved.items():
 
 # %% [markdown]
 # **Answer.** The discriminator learns from tags, and its gradient tells the generator how to change its windows so that they are taken for
-# real. After 1,000 iterations, the noise has nearly the real standard deviation. This is not yet the same as looking real: notebooks 05 and
-# 10 find differences. (The GAN of notebook 12 is the pipeline's, with other draws, so its curve is another.)
+# real. After 1,000 iterations, the noise has about the size of real noise. This is not yet the same as looking real: notebooks 05 and 10
+# find differences. (The GAN of notebook 12 is the pipeline's, with other draws, so its curve is another.)
 #
 # ## Exercises
 #

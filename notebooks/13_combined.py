@@ -172,9 +172,9 @@ with drawing(alt, height=1.9, title=title) as panel:
 # %% [markdown]
 # *What to see:* the detector that was trained on the paper's sum is as useless as the one that was trained without noise, although a plot
 # shows hardly any difference to telemetry. After Gaussian noise with the standard deviation of the real noise, which takes one line, it
-# alarms about as seldom as after real data, and both find the drift in every window, so that a smaller one would be needed to compare them.
-# After *coarse* it never alarms, because its threshold lies above the scores of all real windows; it finds no drift either. (Rates differ a
-# little between notebooks, which draw other windows.)
+# alarms on a few per cent, somewhat more than after real data, and both find the drift in every window, so that a smaller one would be
+# needed to compare them. After *coarse* it never alarms, because its threshold lies above the scores of all real windows; it finds no drift
+# either. (Rates differ a little between notebooks, which draw other windows.)
 
 # %%
 say("False alarms: " + ", ".join(f"{kind} **{rate:.1%}**" for kind, rate in rates.items()) + ".")
@@ -281,7 +281,7 @@ with drawing(
     alt,
     2,
     2.2,
-    f"GAN noise: an uneven spectrum; {measured['GAN']['same in all windows']:.0%} of it is one pattern",
+    f"GAN noise: an uneven spectrum; {measured['GAN']['same in all windows']:.0%} of its power is one pattern",
 ) as panels:
     for name, (color, style) in styles.items():
         ratio = power(noise_of[name].astype(float)) / power(real_noise)
@@ -291,14 +291,14 @@ with drawing(
     for name in ("GAN", "floor: other real noise"):
         color, _ = styles[name]
         panels[1].plot(noise_of[name].mean(axis=0), color=color, linewidth=0.8)
-    panels[1].set(xlabel="time in the window (s)", ylabel="mean of all windows")
+    panels[1].set(xlabel="time in the window (s)", ylabel="mean (dimensionless)")
 
 # %% [markdown]
 # *What to see:* left, above 40 mHz, the power of the GAN's noise goes up and down around that of real noise, by more than the floor does.
 # Below 40 mHz, real noise has little power: the moving average has taken nearly all but a trace of the two-minute rotation, at 8.3 mHz.
-# There, Gaussian numbers and the GAN's noise are both far off. Right, one fixed pattern lies under all windows of the GAN; it is as rough
-# as noise, so that no histogram and no single window shows it. In the table, the size and the values are nearly right. What many windows
-# have in common, the pattern and the number of dimensions, is not.
+# There, Gaussian numbers are far off, and so is the GAN's noise below 20 mHz. Right, one fixed pattern lies under all windows of the GAN;
+# it is as rough as noise, so that no histogram and no single window shows it. In the table, the size and the values are nearly right here.
+# What many windows have in common, the pattern and the number of dimensions, is not.
 
 # %%
 _ = verdict(pipeline, "C6")
@@ -360,7 +360,8 @@ assert budget == "smoke" or (share[0.9] > 0.5 and share[1.0] < 0.05 and share[1.
 
 # %% [markdown]
 # **Answer.** Not with the paper's noise: a detector that looks outside the main directions then alarms on every nominal window. With
-# Gaussian noise of the right size, it alarms about as seldom as after real data, and still finds every drift of this size.
+# Gaussian noise of the right size, it alarms on a few per cent, somewhat more than after real data, and still finds every drift of this
+# size.
 #
 # ## Exercises
 #

@@ -196,7 +196,7 @@ with drawing(alt, 2, 2.4, title, sharey=True) as panels:
         panel.plot(curves[:, 1], color=GENERATED, linestyle=DASHED, label="generated noise")
         panel.set(title=name, xlabel="iteration", ylim=(0, None))
         panel.legend(frameon=False)
-    panels[0].set_ylabel("cross-entropy")
+    panels[0].set_ylabel("cross-entropy (nats)")
 
 # %% [markdown]
 # *What to see:* in both panels the loss on generated noise moves, which looks like training. On the left it rises, and the loss on real

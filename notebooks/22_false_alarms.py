@@ -158,14 +158,14 @@ if is_full:
 
 # %% [markdown]
 # The true signal without noise sets the threshold at nearly nothing: twenty directions describe it whole. They do not describe square
-# waves: what is left of *coarse* is larger than real noise, without any noise, and its threshold is too high. The paper's noise has nearly
-# the right standard deviation, but few directions (notebook 13): the detector learns them, and its threshold describes what is left.
-# Gaussian noise and residual windows leave as much as real noise does.
+# waves: what is left of *coarse* is larger than real noise, without any noise, and its threshold is too high. Here, the paper's noise has
+# nearly the right standard deviation, but few directions (notebook 13): the detector learns them, and its threshold describes what is left.
+# Gaussian noise and residual windows leave nearly as much as real noise does.
 #
 # ## The scale of the noise
 #
 # How exact must the standard deviation be? Multiply the Gaussian noise of the enhanced arm by a factor, train the detector, set its
-# threshold, and count the alarms. (The noise is drawn anew here and in notebook 13, so the rate at factor 1 differs by up to a point.)
+# threshold, and count the alarms. (The noise is drawn anew here and in notebook 13, so the rate at factor 1 differs by a point or two.)
 
 # %%
 (first, second), noises = np.split(enhanced, 2), rng.standard_normal((2, number, enhanced.shape[1]))
@@ -224,7 +224,7 @@ for name, noise in {
 assert not is_full or shot_alarms["Gaussian"] > 0.1 > 0.03 > shot_alarms["noise windows drawn again"]
 
 # %% [markdown]
-# It is not enough: with the same standard deviation, Gaussian noise sets a threshold that is too low for shot noise. Noise drawn from
+# Here it is not enough: with the same standard deviation, Gaussian noise sets a threshold that is too low for shot noise. Noise drawn from
 # real windows sets the right one.
 #
 # ## All of it at once

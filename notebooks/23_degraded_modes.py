@@ -260,11 +260,11 @@ assert errors["paper"]["outside"] > errors["coarse"]["outside"]
 
 # %% [markdown]
 # **Answer.** Notice it, and discard such windows or show them in training. At severity 0.5, the score flags every stuck and every drifting
-# window, without the truth. Of windows that are stuck at severity 0.05 it flags few, and there the error is hardly larger than nominal. At
-# severity 0.1, it lets more than half pass, although the median error is nearly twice the nominal one. It looks at the coarse run alone, so
-# it cannot tell whether that run is right. Training on simulated faults lowers the error from severity 0.25 on, also beyond the severities
-# that it has shown. On nominal windows it raises the error of ridge regression, in the study from 0.030 to 0.081. It needs the true
-# response to faults.
+# window, without the truth. Of windows that are stuck at severity 0.05 it flags few, and there the error is a quarter larger than nominal.
+# At severity 0.1, it lets more than half pass, although the median error is about twice the nominal one. It looks at the coarse run alone,
+# so it cannot tell whether that run is right. Training on simulated faults lowers the error from severity 0.25 on, also beyond the
+# severities that it has shown. On nominal windows it raises the error of ridge regression, in the study from 0.030 to 0.081. It needs the
+# true response to faults.
 #
 # ## Exercises
 #

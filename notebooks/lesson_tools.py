@@ -246,7 +246,7 @@ def save_film(frames: "dict[int, np.ndarray]", real_sd: float) -> None:
     (line,) = panel.plot(frames[recorded[0]][0], color=GENERATED, linewidth=0.6)
     panel.axhspan(-2 * real_sd, 2 * real_sd, color=REAL, alpha=0.12, linewidth=0, label="±2 sd of real noise")
     panel.set(xlabel="time (s)", ylabel="noise (dimensionless)", ylim=(-1, 1), xlim=(0, 500))
-    panel.legend(frameon=False, loc="lower right")
+    panel.legend(facecolor="white", framealpha=1, loc="lower right")
 
     def redraw(iteration: int) -> None:
         line.set_ydata(frames[iteration][0])
