@@ -24,7 +24,7 @@ from enhsim_tf.telemetry.cleaning.raw import RawChannel
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.cleaning.times import jumps_back
 from enhsim_tf.telemetry.reading.clock import NO_TIME
-from enhsim_tf.telemetry.reading.column_names import words_of
+from enhsim_tf.telemetry.reading.column_names import names_series
 from enhsim_tf.telemetry.reading.columns import Layout, anomalous, lay_out
 from enhsim_tf.telemetry.reading.files import read_table
 from enhsim_tf.telemetry.reading.repeated_parts import files_of_rows
@@ -37,11 +37,6 @@ _SAID = {
     "own columns": "columns that this tool wrote beside the values, not taken as channels",
     "columns left out": "columns without numbers",
 }
-_KEYS = set(
-    "host hostname sensor sensorid device deviceid node tag tagname channel channelname parameter "
-    "param signal variable metric field series measurement point pointname station machine asset "
-    "entity source location site name id copy table result item object unit".split()
-)
 _FIRST = "_field field series metric parameter signal variable sensor channel tag".split()
 _OFF = set("off false no closed inactive low disabled disarmed stopped down idle 0 n".split())
 _PAIR = re.compile(r"[A-Za-z]\w* ?[:=] ?[+-]?\d")  # a name and its value in one cell
@@ -345,13 +340,13 @@ def _is_key(
     if chosen and codes.max() == _codes(frame, chosen).max():
         return False
     if times is None:
-        return _is_named(name) and np.bincount(codes).min() > 1
+        return names_series(name) and np.bincount(codes).min() > 1
     before, after = (_repeating(frame, keys, times) for keys in (chosen, [*chosen, name]))
     if before > _OFTEN and after < before / 2:
         return True
     if chosen:
         return False
-    if _is_named(name) and name != "result" and np.bincount(codes).min() > 2:
+    if names_series(name) and name != "result" and np.bincount(codes).min() > 2:
         return True
     known = times != pd.NaT.value
     times = times[known]
@@ -371,11 +366,6 @@ def _is_key(
             [{"series_column": name}, {"series_column": NO_TIME}],
         )
     return False
-
-
-def _is_named(name: str) -> bool:
-    words = words_of(name)
-    return bool(words) and (words[-1] in _KEYS or "".join(words) in _KEYS) and words[0] in _KEYS
 
 
 def _codes(frame: pd.DataFrame, columns: Sequence[str]) -> np.ndarray:
@@ -406,7 +396,7 @@ def _refuse_numbered(layout: Layout, times: np.ndarray) -> None:
             pd.api.types.is_integer_dtype(cells.dtype)
             and layout.channels != (name,)
             and 1 < cells.nunique() <= _MAX_SERIES
-            and (_is_named(name) or not cells.is_monotonic_increasing)
+            and (names_series(name) or not cells.is_monotonic_increasing)
             and _repeating(frame, [name], times) < 0.02
             and not 0 < len(jumps) < np.count_nonzero(np.diff(cells))
         ):

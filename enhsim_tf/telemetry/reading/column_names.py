@@ -19,6 +19,11 @@ BESIDE = set(
     "step ref reference header stamp end stop".split()
 )
 _ENDS = set("end ende stop finish until bis to fin hasta tot".split())  # of an interval
+_KEYS = set(
+    "host hostname sensor sensorid device deviceid node tag tagname channel channelname parameter "
+    "param signal variable metric field series measurement point pointname station machine asset "
+    "entity source location site name id copy table result item object unit".split()
+)
 UNIT_OF = {word: unit for unit, words in UNITS.items() for word in words.split()}
 _DAY_WORDS = ("mjd", "jd", "datenum")
 
@@ -72,3 +77,9 @@ def tells_time_of(signal: str, name: str) -> bool:
 def without_ends(names: list[str]) -> list[str]:
     """Leaves out the ends of intervals beside their beginnings."""
     return [name for name in names if _ENDS.isdisjoint(words_of(name))] or names
+
+
+def names_series(name: str) -> bool:
+    """Whether a name is one of what tells series apart, such as a sensor or its place."""
+    words = words_of(name)
+    return bool(words) and (words[-1] in _KEYS or "".join(words) in _KEYS) and words[0] in _KEYS

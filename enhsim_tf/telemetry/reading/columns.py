@@ -22,7 +22,7 @@ from enhsim_tf.telemetry.reading.clock import (
 )
 from enhsim_tf.telemetry.reading.clock_parts import Clock
 from enhsim_tf.telemetry.reading.clock_values import is_epoch
-from enhsim_tf.telemetry.reading.column_names import is_unnamed, words_of
+from enhsim_tf.telemetry.reading.column_names import is_unnamed, names_series, words_of
 from enhsim_tf.telemetry.reading.contents import Contents, contents_of
 from enhsim_tf.telemetry.reading.repeated_parts import one_after_another, refuse_restarts
 from enhsim_tf.telemetry.reading.text_files import Table
@@ -112,7 +112,9 @@ def lay_out(
         table = dataclasses.replace(table, findings=(*table.findings, said))
     elif options.series_column is None:
         counters = left_out.get("row numbers", ()) if time is None else ()
-        refuse_restarts(contents, counters, times, words if len(channels) > 1 else ())
+        # of one channel, sensors may stand one below the other
+        tests = [name for name in words if len(channels) > 1 or not names_series(name)]
+        refuse_restarts(contents, counters, times, tests)
     return Layout(
         **vars(table),
         clock=clock,
