@@ -1374,3 +1374,13 @@ def test_a_year_and_a_month_beside_dates_are_no_channels(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text(table("time,Year,Month,v", UTC, [2024] * N, [3] * N, VALUES))
     check(one(path))
+
+
+def test_a_counter_and_fractions_of_a_second_are_no_signals_of_clocks_of_their_own(tmp_path):
+    path = tmp_path / "bag.csv"
+    fractions = [250_000_000 * (k % 4) for k in range(N)]
+    header = "Time,header.seq,header.stamp.secs,header.stamp.nsecs,linear.x"
+    path.write_text(table(header, UNIX + 0.5, 700 + np.arange(N), UNIX, fractions, VALUES))
+    channels = read_source(path)
+    check(channels["linear.x"], start=START + pd.Timedelta("500ms"))
+    assert "header.stamp.nsecs" not in channels

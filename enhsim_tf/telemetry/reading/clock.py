@@ -391,11 +391,20 @@ def refuse_own_clocks(table: Contents, asked: Collection[str]) -> None:
     are asked for.
     """
     frame = table.frame
-    kinds = table.kinds
     numbers = table.numbers
+    # counters and fractions of a second are no signals
+    beside = {name for clock in clocks_of_fractions(numbers) for name in clock.columns[1:]}
+    beside |= {
+        name for name, values in numbers.items() if np.sum(np.diff(values) == 1) > 0.9 * len(values)
+    }
+    kinds = {
+        name: kind
+        for name, kind in table.kinds.items()
+        if name not in beside or name_tells(name)[0] == 2
+    }
     clocks = {
         name
-        for name in frame
+        for name in kinds
         if kinds[name] == "dates"
         or name in numbers
         and name_tells(name)[0] == 2
@@ -458,6 +467,7 @@ def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[st
     numbers = table.numbers
     found = {name for name in numbers if name_tells(name)[0] == 2}
     found.update(table.of_kind("dates"), table.of_kind("times of day"))
+    found.update(name for other in clocks_of_fractions(numbers) for name in other.columns)
     if times is None:
         parts = clock_of_parts(table) or Clock()
         return found.union(
