@@ -342,9 +342,7 @@ def _names_of(
     # names in two lines; those in merged cells go before several of the other line
     for row in (*block[:header], *block[header + 1 :]):
         pairs = list(itertools.zip_longest(names, row, fillvalue=""))
-        is_merged = any(other and not name for name, other in pairs[1:]) and all(
-            other for _, other in pairs[1:]
-        )
+        is_merged = 1 < width >= 2 * sum(map(bool, names[1:])) + 1 and all(row[1:width])
         before = ""
         for place, (name, other) in enumerate(pairs):
             before = name or before
