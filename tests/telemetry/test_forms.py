@@ -1384,3 +1384,44 @@ def test_a_counter_and_fractions_of_a_second_are_no_signals_of_clocks_of_their_o
     channels = read_source(path)
     check(channels["linear.x"], start=START + pd.Timedelta("500ms"))
     assert "header.stamp.nsecs" not in channels
+
+
+FIRMWARE = ["2.40.55"] * N
+READ_AS_THEY_ARE = {
+    "words with points beside a clock": table("time,Firmware,v", UTC, FIRMWARE, VALUES),
+    "several lines in a cell": table(
+        "time,note,v", UTC, [*[""] * 30, '"1. open,\n2. close, wait"', *[""] * (N - 31)], VALUES
+    ),
+    "a last cell that names leave out": table(
+        '"id","time","v"', [f'"{k}"' for k in range(1, N + 1)], UTC, VALUES, [""] * N
+    ),
+    "UTC in a longer line above": table("# Time zone of all times here: UTC\ntime,v", UTC, VALUES),
+    "a date with an offset of something else": table(
+        "time,shift_start,v", MINUTES, ["2024-02-29T22:00:00+01:00"] * N, VALUES
+    ),
+    "seconds and milliseconds that are no time": table(
+        "time,on_s,on_ms,v", UTC, np.arange(N) % 9, 7 * np.arange(N) % 990, VALUES
+    ),
+}
+
+
+@pytest.mark.parametrize("text", READ_AS_THEY_ARE.values(), ids=READ_AS_THEY_ARE)
+def test_what_looks_like_another_form_is_read_as_it_is(tmp_path, text):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    channels = read_source(path)
+    check(channels["v"])
+    assert ("on_s" in channels) == ("on_s" in text)
+
+
+def test_a_date_of_zeros_alone_is_bad(tmp_path, refused):
+    path = tmp_path / "a.csv"
+    path.write_text(table("time,v", ["00/00/0000 00:00", *stamps("20/03/%Y %H:%M")[1:]], VALUES))
+    with refused("1 in all", "--drop-bad"):
+        read_source(path)
+
+
+def test_seconds_since_a_time_of_day_count_from_zero(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(table("Time since 00:00 [s],v", SECONDS, VALUES))
+    check(one(path), start="1970-01-01T00:00Z")

@@ -88,6 +88,32 @@ def test_the_order_of_the_rows_of_different_parts_does_not_matter(table):
     check_parts(telemetry)
 
 
+def test_the_latest_row_may_come_first():
+    (telemetry,) = read_telemetry(
+        TOGETHER[::-1].reset_index(drop=True), Cleaning(part_column="unit")
+    )
+    check_parts(telemetry)
+
+
+def test_late_rows_do_not_split_a_part():
+    late = [*range(10), *range(13, 16), *range(10, 13), *range(16, len(TOGETHER))]
+    table = TOGETHER.iloc[late].reset_index(drop=True)
+    (telemetry,) = read_telemetry(table, Cleaning(part_column="unit"))
+    check_parts(telemetry)
+
+
+def test_parts_of_sensors_one_below_the_other_are_numbered_for_each(tmp_path):
+    long = TOGETHER.melt(["unit", "time"], var_name="sensor")
+    (telemetry,) = read_telemetry(long, Cleaning(part_column="unit", series_column="sensor"))
+    check_parts(telemetry)
+
+
+@pytest.mark.parametrize("column", ["amperes", "none"])
+def test_a_column_that_tells_no_parts_apart_is_refused(column):
+    with pytest.raises(InputError, match="part_column|a column of"):
+        read_telemetry(TOGETHER, Cleaning(part_column=column))
+
+
 def test_parts_are_further_apart_than_gaps_of_a_given_interval():
     table = TOGETHER.assign(time=TOGETHER.time / 10)
     cleaning = Cleaning(part_column="unit", interval_s=1)
@@ -107,14 +133,18 @@ def test_a_part_begins_at_its_own_first_time():
     assert [part.offset_s for part in telemetry.parts] == [0, 115, 200]
 
 
-@pytest.mark.parametrize("table", [TOGETHER, COUNTED, WORDS], ids=["times", "samples", "words"])
+@pytest.mark.parametrize(
+    "table",
+    [TOGETHER, COUNTED, WORDS.rename(columns={"unit": "trial"})],
+    ids=["times", "samples", "words"],
+)
 def test_advice_where_times_begin_again_tells_the_parts_apart(tmp_path, table):
     path = tmp_path / "tests.csv"
     table.to_csv(path, index=False)
     first = follow([str(path)])[0]
-    assert first.options[-1].endswith("--part-column unit")
+    assert first.options[-1].endswith(f"--part-column {table.columns[0]}")
     assert [len(part) for part in first.channels["volts"].telemetry.parts] == list(LENGTHS)
-    assert "unit" not in first.channels
+    assert table.columns[0] not in first.channels
 
 
 def test_advice_for_files_over_the_same_times_takes_each_as_a_part(tmp_path):

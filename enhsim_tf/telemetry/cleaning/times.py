@@ -135,10 +135,13 @@ def parse_times(
             return reader.of_numbers(times, form)
         width = len(datetime.datetime(2000, 1, 1).strftime(form))  # numbers have lost leading zeros
         given = times.notna()
-        if "%f" not in form and (times[given] % 1 == 0).all():
-            text = times.astype("Int64").astype(str).str.zfill(width)
-        else:
+        if ".%f" in form:
             text = times.map(f"{{:0{width}.6f}}".format)
+        elif (times[given] % 1 == 0).all():
+            text = times.astype("Int64").astype(str)
+            text = text if "%f" in form else text.str.zfill(width)
+        else:
+            text = times.astype(str)
         times = text.where(given)
     return reader.of_text(times, form, is_format)
 
@@ -451,7 +454,8 @@ def _orders(text: pd.Series, mark: str, year: str) -> list[str]:
         mark.join(order)
         for order in orders[: 3 if year == "%y" else 2]
         if all(
-            parts[place].max() <= most.get(kind, 99) and parts[place].min() >= (kind in most)
+            parts[place].max() <= most.get(kind, 99)
+            and (kind not in most or parts[place].max() > 0)
             for place, kind in enumerate(order)
         )
     ]

@@ -252,7 +252,7 @@ def _with_different_names(
     parts = {options.part_column} - {None, FILE}
     asked += [*(options.label_column or ()), *(options.series_column or ()), *parts, *times]
     for name in asked:
-        if name not in names and name != NO_TIME:
+        if name not in names and (name != NO_TIME or name in parts):
             raise InputError(
                 f"Expected a column of {table.what}: {', '.join(names[:8])}. Received: {name!r}. "
                 "Name one of these."

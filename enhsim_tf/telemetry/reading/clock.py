@@ -64,15 +64,18 @@ _FACTOR = re.compile(
     re.IGNORECASE,
 )
 # zeros of times other than 1970
-_SINCE = re.compile(r"since[\W_]+(?!.*1970)\d\d|mjd[\W_]?2", re.IGNORECASE)
+_SINCE = re.compile(
+    r"since[\W_]+(?!.*70\b)(?:\d{4}|\d\d?[-./_]\d\d?[-./_]\d\d)|mjd[\W_]?2(?:000|k)", re.IGNORECASE
+)
+_NO_UNITS = set("cs ds yr yrs year years month months week weeks deciseconds centiseconds".split())
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\W\d_]+)\s*[\])]\s*$")
 _PLACE = re.compile(r"\b[A-Z]\w+/[A-Z]\w+\b")  # as Europe/Berlin
 _ZONE = re.compile(
-    r"\b(?:[CEW]ES?T|MES?Z|BST|JST|IST|MSK|HKT|SGT|SAST|LST|NZ[SD]T|A[CEWK][SD]T|[ECHMP][SD]T|"
+    r"\b(?:[CEW]ES?T|MES?Z|BST|JST|MSK|HKT|SGT|SAST|LST|NZ[SD]T|A[CEWK][SD]T|[ECHMP][SD]T|"
     r"\w+ (?:Standard|Daylight) Time)\b|(?:UTC|GMT)[+-]\d"
 )
-_ZONE_ABOVE = re.compile(r".{,20}\btime ?zone\b.{,20}", re.IGNORECASE)
-_UTC = re.compile(r"(?:UTC|GMT)(?!\W?[+-]?\d)")
+_ZONE_ABOVE = re.compile(r".*\btime ?zone\b.*", re.IGNORECASE)
+_UTC = re.compile(r"\b(?:UTC|GMT|Z)\b(?!\W{0,2}[+-]0*[1-9])|Universal|Zulu|\bno\b|\W0\s*$")
 _TIME_LIKE = r"\s*(?:[01]?\d|2[0-4]) ?(?:[:hH] ?[0-5]\d|([.-])[0-5]\d\1[0-5]\d)(?!\d).*"
 _WITH_YEAR = re.compile(r"\d:\d\d.*\b20\d\d|\b20\d\d.*\d:\d\d")
 _COUNT = {"time": NO_TIME}  # the option of counting the samples
@@ -302,17 +305,17 @@ def unit_of(clock: Clock, table: Table) -> str | None:
     unit = table.units.get(name, "").strip(" []().")
     stated = f"{name} [{unit}]"
     factor = _FACTOR.search(stated)
-    words = words_of(name)
-    form = name_tells(name)[1] or UNIT_OF.get(unit.casefold().partition(" ")[0])
-    form = form or (UNIT_OF.get(words[-1]) if len(words) > 1 else None)
-    in_brackets = _IN_BRACKETS.search(name)
+    found = _IN_BRACKETS.search(name)
+    in_brackets = found[1].casefold() if found else ""
+    form = name_tells(name)[1] or UNIT_OF.get(unit.casefold().partition(" since")[0])
+    form = form or UNIT_OF.get(in_brackets)
     unknown = ""
     if factor and not re.fullmatch(r"0+|1(?:\.0*)?|24", factor[1]):
         unknown = "a multiple of a unit"
     elif _SINCE.search(stated):
         unknown = "another zero than 1970"
-    elif in_brackets and form is None and not name_tells(name)[0]:
-        unknown = f"the unit {in_brackets[1]}"
+    elif in_brackets in _NO_UNITS:
+        unknown = f"the unit {in_brackets}"
     if unknown and is_numeric:
         raise InputError(
             f"Expected times in s, ms, us or ns, since 1970 or from zero. Received: {unknown} in "
@@ -376,8 +379,10 @@ def refuse_other_zone(times: Times, table: Contents, further: Collection[str]) -
             stamps = parse_times(table.frame[name], "", drop=True).stamps.tz_localize(None)
         else:
             continue
-        apart = abs((stamps - times.stamps).median())
-        if pd.Timedelta("15min") <= apart <= pd.Timedelta("14h"):
+        off = pd.Series(abs(stamps - times.stamps))
+        apart = off.median()
+        is_zone = name in table.numbers or off.nunique() == 1
+        if is_zone and pd.Timedelta("15min") <= apart <= pd.Timedelta("14h"):
             raise InputError(
                 f"Expected dates that agree with times whose zone is known. Received: {name!r} of "
                 f"{table.what}, {apart.total_seconds() / 3600:g} h apart from them.",
@@ -467,7 +472,8 @@ def further_clocks(table: Contents, clock: Clock, times: Times | None) -> set[st
     numbers = table.numbers
     found = {name for name in numbers if name_tells(name)[0] == 2}
     found.update(table.of_kind("dates"), table.of_kind("times of day"))
-    found.update(name for other in clocks_of_fractions(numbers) for name in other.columns)
+    for other in clocks_of_fractions(numbers):
+        found.update(other.columns if is_increasing(numbers[other.columns[0]]) else ())
     if times is None:
         parts = clock_of_parts(table) or Clock()
         return found.union(

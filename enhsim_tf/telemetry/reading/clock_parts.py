@@ -14,7 +14,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.options import UNITS
 from enhsim_tf.telemetry.cleaning.times import may_be_time_of_day, parse_times
 from enhsim_tf.telemetry.reading.clock_values import are_whole
-from enhsim_tf.telemetry.reading.column_names import UNIT_OF, without_ends, words_of
+from enhsim_tf.telemetry.reading.column_names import UNIT_OF, name_tells, without_ends, words_of
 from enhsim_tf.telemetry.reading.contents import Contents, different, first_cells
 
 _PARTS = {
@@ -53,10 +53,8 @@ def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
     """Returns a table in which the numbers of a column named `HHMM` or `HHMMSS`, or words such as
     `18.00.00`, are times of day in text, if there are days and no other times of day beside it.
     """
-    for name in table.of_kind("words") if dates else ():
-        if first_cells(table.frame[name]).str.fullmatch(_DOTTED).all():
-            text = table.frame[name].str.replace(".", ":", regex=False)
-            return _with_text(table, name, text)
+    if table.of_kind("times of day") or "hour" in parts_of(table.numbers):
+        return table
     found = {}
     for name, values in table.numbers.items():
         words = set(words_of(name)) - {"time", "utc", "gmt", "local"}
@@ -64,9 +62,14 @@ def with_times_of_day(table: Contents, dates: Sequence[str]) -> Contents:
             digits = len(words.pop())
             if are_whole(values, 0, 24 * 10 ** (digits - 2)) and may_be_time_of_day(values):
                 found[name] = digits
-    if len(found) != 1 or table.of_kind("times of day") or "hour" in parts_of(table.numbers):
-        return table
-    if not (dates or clock_of_parts(table)):
+    dotted = [
+        name
+        for name in table.of_kind("words")
+        if name_tells(name)[0] and first_cells(table.frame[name]).str.fullmatch(_DOTTED).all()
+    ]
+    if dates and len(dotted) == 1 and not found:
+        return _with_text(table, dotted[0], table.frame[dotted[0]].str.replace(".", ":"))
+    if len(found) != 1 or not (dates or clock_of_parts(table)):
         return table
     ((name, digits),) = found.items()
     clocks = pd.Series(table.numbers[name].astype(int))

@@ -40,6 +40,7 @@ _ROWS = set(
         "scan seq counter"
     ).split()
 )
+_TESTS = set("test run cycle trial experiment file filename batch lap segment part".split())
 _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
 _LABELLED = {"severity", "onset", "end", "mask"}
@@ -112,8 +113,12 @@ def lay_out(
         table = dataclasses.replace(table, findings=(*table.findings, said))
     elif options.series_column is None:
         counters = left_out.get("row numbers", ()) if time is None else ()
-        # of one channel, sensors may stand one below the other
-        tests = [name for name in words if len(channels) > 1 or not names_series(name)]
+        # sensors and places may stand one below the other
+        tests = [
+            name
+            for name in words
+            if not names_series(name) and (len(channels) > 1 or _TESTS.intersection(words_of(name)))
+        ]
         refuse_restarts(contents, counters, times, tests)
     return Layout(
         **vars(table),

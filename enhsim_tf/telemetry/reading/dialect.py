@@ -334,7 +334,7 @@ def _names_of(
         if mark == BLANKS and len(given) > 1 and ":" in below[1]:
             given = ["", *given]
         # R writes no name above the numbers of the rows, and quotation marks
-        elif line.startswith('"1"'):
+        elif line.startswith('"1"') and all(row[-1] for row in sample):
             given = ["", *(cell.strip('"') for cell in given)]
     if any(any(row[len(given) :]) for row in sample):
         return given, ()
@@ -342,7 +342,9 @@ def _names_of(
     # names in two lines; those in merged cells go before several of the other line
     for row in (*block[:header], *block[header + 1 :]):
         pairs = list(itertools.zip_longest(names, row, fillvalue=""))
-        is_merged = 1 < width >= 2 * sum(map(bool, names[1:])) + 1 and all(row[1:width])
+        has_units = any(cell[:1] in ("[", "(") for cell in row)
+        is_merged = 1 < width > 2 * sum(map(bool, names[1:])) and all(row[1:width])
+        is_merged = is_merged and not has_units
         before = ""
         for place, (name, other) in enumerate(pairs):
             before = name or before

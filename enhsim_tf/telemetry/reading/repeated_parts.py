@@ -50,11 +50,7 @@ def one_after_another(
     else:
         number = table.frame.groupby(column, sort=False, dropna=False).ngroup().to_numpy()
     own_s = pd.Series(times.seconds)
-    steps_s = own_s.groupby(number).diff()
-    long_s = float(np.nan_to_num(steps_s[steps_s > 0].quantile(0.9)))
-    # a value that comes again, as that of a step of every cycle, begins another part
-    again = (steps_s < -10 * long_s).groupby(number).cumsum()
-    number = again.groupby([number, again], sort=False).ngroup().to_numpy()
+    number, long_s = _numbered(table, number, own_s, options)
     # further apart than a gap that is filled
     gap_s = (options.longest_gap + 2) * max(long_s, options.interval_s or 0.0)
     reach_s = own_s.max() - min(own_s.min(), 0.0) + gap_s
@@ -71,6 +67,36 @@ def one_after_another(
     )
     placed = Times(stamps, times.bad, times.form, times.zone, times.counts)
     return placed, Finding("parts", last + 1, text)
+
+
+def _numbered(
+    table: Contents, value: np.ndarray, own_s: pd.Series, options: Cleaning
+) -> tuple[np.ndarray, float]:
+    """Returns the number of the part of each row, given that of its value, and a long step within
+    parts. A value that comes again with its first time, as that of a step of every cycle, begins
+    another part.
+    """
+    keys = [name for name in options.series_column or () if name in table.frame]
+    series = table.frame.groupby(keys, dropna=False).ngroup() if keys else 0
+    rows = pd.DataFrame({"value": value, "series": series, "time": own_s})
+    by = ["value", "series"]
+    if rows.groupby(by)["time"].diff().median() < 0:  # the latest row comes first
+        rows = rows[::-1]
+    rows = rows.assign(place=np.arange(len(rows)))
+    groups = rows.groupby(by)
+    steps = groups["time"].diff()
+    is_first_time = rows["time"] <= groups["time"].cummin() + steps.abs().median()
+    restarts = (steps < 0) & (groups["place"].diff() > 1) & is_first_time
+    rows = rows.assign(again=restarts.groupby([rows[name] for name in by]).cumsum())
+    number = rows.groupby(["value", "again"], sort=False).ngroup().sort_index().to_numpy()
+    num_parts = number.max(initial=0) + 1
+    if 2 * num_parts > len(number):
+        raise InputError(
+            f"Expected part_column (--part-column) with several rows for each value. Received: "
+            f"{options.part_column!r} of {table.what}, {num_parts:,} parts of {len(number):,} "
+            "rows. Name another column."
+        )
+    return number, float(np.nan_to_num(steps.abs()[(steps != 0) & ~restarts].quantile(0.9)))
 
 
 def refuse_restarts(

@@ -75,7 +75,7 @@ def table_of(
         decimal,
         tuple(findings),
         units,
-        " ".join(dialect.above),
+        "\n".join(dialect.above),
     )
 
 
@@ -161,15 +161,21 @@ def _refuse_open_quote(frame: pd.DataFrame, text: bytes, begin: int, dialect: Di
     """Refuses a cell in quotation marks that holds what reads as rows of its own."""
     if text.find(b'"', begin) < 0 or text.count(b"\n", begin) <= len(frame):
         return
-    row_inside = rf"\n\d[^\n]*{re.escape(dialect.separator)}"
+    mark = dialect.separator
+    first = re.sub(r"\d", "0", dialect.head[0][0]) + mark
+
+    def is_row(line: str) -> bool:
+        is_full = line.count(mark) >= max(2, len(dialect.names) - 1)
+        return is_full or len(first) > 8 and re.sub(r"\d", "0", line).startswith(first)
+
     for column in filter(lambda column: is_text(frame[column]), frame):
-        found = frame[column].astype("str").str.contains(row_inside).fillna(False).to_numpy(bool)
-        if found.any():
-            raise InputError(
-                "Expected quotation marks in pairs. Received: one in line "
-                f"{int(np.argmax(found)) + dialect.line} of {dialect.file} with further lines "
-                "inside. Correct it."
-            )
+        cells = frame[column].dropna().astype("str")
+        for row, cell in cells[cells.str.contains("\n", regex=False)].iloc[:1_000].items():
+            if any(map(is_row, cell.split("\n")[1:])):
+                raise InputError(
+                    "Expected quotation marks in pairs. Received: one in line "
+                    f"{row + dialect.line} of {dialect.file} with further rows inside. Correct it."
+                )
 
 
 def _without_ragged(data: bytes, dialect: Dialect, drop: bool) -> tuple[bytes, list[Finding]]:
