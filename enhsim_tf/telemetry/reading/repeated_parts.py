@@ -35,7 +35,7 @@ def one_after_another(
     ten seconds behind the one before it, and says so.
 
     Raises:
-        InputError: If there is no clock that counts.
+        InputError: If there is no clock that counts, or the column tells no parts apart.
     """
     column = str(options.part_column)
     if times is None or not times.counts:
