@@ -72,15 +72,8 @@ def run_score(options: argparse.Namespace) -> int:
             for name in scored.not_judged:
                 reason = left.get(name, "it is not in the source")
                 lines.append(f"{printable(name)}: not judged: {reason}")
-            tell(
-                "\n".join(
-                    [
-                        *lines,
-                        *notes,
-                        *_said(scored, simulator, paths[model], options.chosen.false_alarm_rate),
-                    ]
-                )
-            )
+            wanted = options.chosen.false_alarm_rate
+            tell("\n".join([*lines, *notes, *_said(scored, simulator, paths[model], wanted)]))
 
     code = for_each(channels, write)
     if options.json:

@@ -44,16 +44,16 @@ def fit_waves(recording: Telemetry, options: FitOptions, progress: Progress) -> 
     """Fits one square wave or constant level to each channel; see `fit.fit`."""
     learnt, held_out, note = _split(recording, options.held_out)
     channels = recording.columns
-    refused: dict[str, str] = {}
+    refused: dict[int, str] = {}
     told = progress.loop("coarse simulator", len(channels))
 
     @functools.cache  # those of the other channels stay where one is refused
-    def chosen(name: str, why: str | None) -> CoarseChoice:
-        told(channels.index(name))
-        return choose_coarse(learnt.select([name]), options.window, why)
+    def chosen(channel: int, why: str | None) -> CoarseChoice:
+        told(channel)
+        return choose_coarse(learnt.select([channels[channel]]), options.window, why)
 
     while True:
-        choices = [chosen(name, refused.get(name)) for name in channels]
+        choices = [chosen(channel, refused.get(channel)) for channel in range(len(channels))]
         reasons = [choice.said for choice in choices]
         if len(channels) > 1:
             reasons = [f"{name}: {said}" for name, said in zip(channels, reasons, strict=True)]
@@ -66,7 +66,7 @@ def fit_waves(recording: Telemetry, options: FitOptions, progress: Progress) -> 
         try:
             waves, choice, noise, clean = _fit_aligned(usable, choices, window, options, progress)
         except _FlatError as error:
-            refused[channels[error.channel]] = (
+            refused[error.channel] = (
                 "nothing can be learnt from its best square wave, which its windows do not follow"
             )
         else:

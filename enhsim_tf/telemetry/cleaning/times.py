@@ -454,8 +454,7 @@ def _orders(text: pd.Series, mark: str, year: str) -> list[str]:
         mark.join(order)
         for order in orders[: 3 if year == "%y" else 2]
         if all(
-            parts[place].max() <= most.get(kind, 99)
-            and (kind not in most or parts[place].max() > 0)
+            (kind in most) <= parts[place].max() <= most.get(kind, 99)
             for place, kind in enumerate(order)
         )
     ]

@@ -343,8 +343,8 @@ def _names_of(
     for row in (*block[:header], *block[header + 1 :]):
         pairs = list(itertools.zip_longest(names, row, fillvalue=""))
         has_units = any(cell[:1] in ("[", "(") for cell in row)
-        is_merged = 1 < width > 2 * sum(map(bool, names[1:])) and all(row[1:width])
-        is_merged = is_merged and not has_units
+        few_names = width > 2 * sum(map(bool, names[1:]))
+        is_merged = few_names and all(row[1:width]) and not has_units
         before = ""
         for place, (name, other) in enumerate(pairs):
             before = name or before

@@ -2,6 +2,7 @@
 a fleet do: in one table, told apart by a column, or in a file each.
 """
 
+import dataclasses
 from collections.abc import Collection
 
 import numpy as np
@@ -65,8 +66,7 @@ def one_after_another(
     text = (
         f"parts told apart by {column}: {last + 1:,}, placed one after another, every {apart_s:,} s"
     )
-    placed = Times(stamps, times.bad, times.form, times.zone, times.counts)
-    return placed, Finding("parts", last + 1, text)
+    return dataclasses.replace(times, stamps=stamps), Finding("parts", last + 1, text)
 
 
 def _numbered(
