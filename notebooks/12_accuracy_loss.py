@@ -112,7 +112,7 @@ assert budget == "smoke" or np.sum(steps > 2 * 2**0.5 * error) > 2
 followed = pipeline.history
 size = followed["sd"] / followed["real_sd"]
 alt = "Standard deviation of the generated noise, divided by that of the real noise, and its lag-1 correlation, by iteration"
-title = "From 500 iterations on, the noise is about as large as real noise"
+title = "Here, the noise is about as large as real noise from iteration 500"
 with drawing(alt, 2, 2.3, title) as panels:
     names = {
         "standard deviation, generated ÷ real": (size, 1.0),
