@@ -128,7 +128,7 @@ with drawing(alt, 2, 2.3, title) as panels:
 
 # %% [markdown]
 # *What to see:* on the left, the standard deviation stays within 15 % of the real one after 500 iterations. On the right, the lag-1
-# correlation is off by up to 0.1 around 1,000 iterations. What neither panel shows, nor any curve of Figure 12, is the number of dimensions
+# correlation is off by about 0.1 around 1,000 iterations. What neither panel shows, nor any curve of Figure 12, is the number of dimensions
 # that the noise fills. The effective rank counts them: $e$ to the entropy of the variance's shares.
 
 
